@@ -164,6 +164,11 @@ def codes(findings: Iterable[Finding]) -> set[str]:
     return {finding.code for finding in findings}
 
 
+def other_than(findings: Iterable[Finding], *gone: str) -> tuple[Finding, ...]:
+    """Return findings without those of some codes."""
+    return tuple(finding for finding in findings if finding.code not in gone)
+
+
 def by_cause(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Return findings with causes before what follows from them, else as they came.
 

@@ -6,7 +6,7 @@ import pytest
 from box_tools import write_tools
 from click.testing import CliRunner
 
-from steelyard.bench import materials
+from steelyard.bench import materials, segment
 from steelyard.bench.objects.cases import load_case
 from steelyard.bench.objects.part_tables import materials_table
 from steelyard.cli.bench import bench
@@ -34,6 +34,12 @@ def test_boxes_get_their_density(folder):
     )
     with pytest.raises(BadValue, match="at least one seed; got 0"):
         materials.run(folder, 0)
+
+
+@pytest.mark.parametrize("job", [materials, segment])
+def test_an_object_that_is_not_there_is_named(folder, job):
+    with pytest.raises(BadValue, match="There is no object 'brik'; there are: brick, club"):
+        job.run(folder, objects=("brick", "brik"))
 
 
 def test_command_prints_one_json_object(folder):

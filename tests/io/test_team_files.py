@@ -22,7 +22,7 @@ from steelyard.logs.recording import Mount, Stream
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_streams import in_grasp_axes, on_one_clock
 from steelyard.logs.team_track import Track
-from steelyard.pipelines.shared_payload import _missing_rows, _repeated_rows
+from steelyard.pipelines.lacking import missing_rows, repeated_rows
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
@@ -505,11 +505,11 @@ def test_rows_that_a_robot_logged_again_are_used_once_and_told(
             if name != "robot1" or (repeated == 20 and found.repeated):
                 np.testing.assert_allclose(found.channels["position"], track.channels["position"], atol=1e-12)
     assert log.recordings[-1].tracks["robot1"].repeated == repeated
-    (told,) = _repeated_rows(log)
+    (told,) = repeated_rows(log)
     assert told.code == "rows-duplicated"
     assert f"{repeated} rows of 'motion-" in told.message
     assert "'robot1'" in told.message
-    assert not list(_missing_rows(log))
+    assert not list(missing_rows(log))
 
 
 def test_equal_stamps_of_a_coarse_clock_are_spread(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_the_point_told_is_the_one_that_rows_were_made_with(monkeypatch: pytest.
     used = []
     monkeypatch.setattr(rows, "SETTLED", 0.0)
     monkeypatch.setattr(rows, "align", lambda r, how: (used.append(how.place), align(r, how))[1])
-    place = rows.rows_to_fit(recording, before, Options()).place
+    place = rows.Reading(recording, before, Options()).rows_to_fit().place
     assert place is not None
     assert len(used) == rows.ROUNDS + 1
     np.testing.assert_array_equal(place.place, used[-1])
@@ -202,7 +202,7 @@ def test_in_slow_motion_noise_does_not_hide_the_tip_of_a_tool(seed: int) -> None
 @pytest.mark.parametrize("seed", range(3))
 def test_slow_motion_of_the_sensor_is_left_alone(seed: int) -> None:
     recording = swaying(seed, 0.8)
-    made = rows.rows_to_fit(recording, (), Options())
+    made = rows.Reading(recording, (), Options()).rows_to_fit()
     assert made.place is None
     assert made.maybe is None
 

@@ -12,7 +12,8 @@ import steelyard as sy
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
-from steelyard.pipelines.shared_payload import METHODS, Method, _missing_rows, _missing_wrenches, identify_team
+from steelyard.pipelines.lacking import missing_rows, missing_wrenches
+from steelyard.pipelines.shared_payload import METHODS, Method, _weighing, identify_team
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.team.estimate import TeamEstimate
@@ -82,7 +83,7 @@ def test_a_robot_that_ends_early_is_said(method: Method) -> None:
 
 
 def test_a_recording_of_one_robot_in_a_few_rows_is_said() -> None:
-    (said,) = _missing_rows(of_rows(trial().log, ("robot2",), slice(700, 708)))
+    (said,) = missing_rows(of_rows(trial().log, ("robot2",), slice(700, 708)))
     assert said.message.startswith("'robot2' lacks 14.9 of the 15 s of 'motion-5' that")
 
 
@@ -91,7 +92,7 @@ def test_a_recording_of_one_robot_in_a_few_rows_is_said() -> None:
     [(("robot1",), slice(0, 1300)), (("robot1",), slice(100, None)), (("robot0", "robot1"), slice(0, 600))],
 )
 def test_loggers_need_not_start_and_end_together(names: tuple[str, ...], rows: slice) -> None:
-    assert not list(_missing_rows(of_rows(trial().log, names, rows)))
+    assert not list(missing_rows(of_rows(trial().log, names, rows)))
 
 
 def without(log: TeamLog, number: int, name: str, *channels: str) -> TeamLog:
@@ -127,11 +128,12 @@ def test_who_was_away_or_held_nothing_lacks_nothing(method: Method) -> None:
     track = log.recordings[2].tracks["robot1"]
     idle = replace(track, carrying=np.zeros(len(track), np.bool_))
     free = replace(log.recordings[2], tracks={**log.recordings[2].tracks, "robot1": idle})
-    assert "rows-missing" not in {f.code for f in _missing_wrenches(log.with_recordings(free), method)}
+    alone = log.with_recordings(free)
+    assert "rows-missing" not in {f.code for f in missing_wrenches(alone, _weighing(alone, method))}
     # Nobody's force is missing where nobody's was to be measured.
     for name in log.names:
         log = without(log, 0, name, "force") if log.recordings[0].tracks[name].has("force") else log
-    assert {f.message.split("'")[3] for f in _missing_wrenches(log, method)} == {"still-2"}
+    assert {f.message.split("'")[3] for f in missing_wrenches(log, _weighing(log, method))} == {"still-2"}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -164,4 +166,4 @@ def test_stamps_in_pairs_lack_nothing() -> None:
         replace(r, tracks={n: replace(t, time=t.time + 4e-3 * (np.arange(len(t)) % 2)) for n, t in r.tracks.items()})
         for r in log.recordings
     ]
-    assert not list(_missing_rows(log.with_recordings(*uneven)))
+    assert not list(missing_rows(log.with_recordings(*uneven)))

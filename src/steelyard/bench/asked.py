@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from typing import TypeVar
 
 from steelyard.errors import BadValue
 
 Progress = Callable[[int, int], None]  # called with what is done and how much there is
+Row = TypeVar("Row")
+
+
+def told(rows: Iterable[Row], count: int, progress: Progress | None) -> Iterator[Row]:
+    """Yield each of `count` rows, and tell of it once the next is asked for."""
+    for done, row in enumerate(rows, start=1):
+        yield row
+        if progress is not None:
+            progress(done, count)
 
 
 def require_known(what: str, asked: Sequence[str], known: Collection[str]) -> None:

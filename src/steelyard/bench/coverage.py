@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, require_one
-from steelyard.bench.pool import batches
+from steelyard.bench.asked import Progress, require_one, told
+from steelyard.bench.pool import BATCH, spread
 from steelyard.check import Array
 from steelyard.errors import SteelyardError
 from steelyard.identify.noise_aware import NoiseAware
@@ -76,11 +76,9 @@ def run(
     jobs = [(s, n) for s in range(seeds) for n in (names if all_objects else (names[s % len(names)],))]
     cases = [Case(motion, noise, spectrum, declared, bias) for spectrum in spectra]
     found: dict[str, list[Outcome | str]] = {case.spectrum: [] for case in cases}
-    for case in cases:
-        for outcomes in batches(partial(_fit, case), jobs, workers):
-            found[case.spectrum] += outcomes
-            if progress is not None:
-                progress(sum(map(len, found.values())), len(jobs) * len(cases))
+    fits = ((case, fit) for case in cases for fit in spread(partial(_fit, case), jobs, workers, BATCH))
+    for case, outcome in told(fits, len(jobs) * len(cases), progress):
+        found[case.spectrum].append(outcome)
     return {
         "bench": "coverage",
         "rules": RULES,

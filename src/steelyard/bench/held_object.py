@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from steelyard import evaluate
-from steelyard.bench.asked import Progress, require_known, require_one
+from steelyard.bench.asked import Progress, require_known, require_one, told
 from steelyard.bench.objects import bound
 from steelyard.bench.objects.cases import (
     METHODS,
@@ -25,13 +25,13 @@ from steelyard.bench.objects.cases import (
     noisy_rows,
 )
 from steelyard.bench.objects.conditions import condition_means, conditions
+from steelyard.bench.objects.folders import chosen_folders
 from steelyard.bench.objects.summary import SCORES, Row, bound_means, summary, table_iv
 from steelyard.bench.pool import spread
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError
 from steelyard.identify.estimate import Estimate
-from steelyard.io.object_folders import object_folders
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 from steelyard.simulate.handling import NOISE, noise_std
@@ -91,24 +91,20 @@ def run(
     plans = [_plan(parts, tuple(noises), seeds, tuple(methods), repeats)]
     if parts == "truth-merged":
         plans.append(_plan("truth-merged-mixed", tuple(noises), seeds, tuple(methods), repeats))
-    folders = _chosen(object_folders(data), objects)
-    found: list[list[Outcome]] = [[] for _ in plans]
-    done = 0
-    for which, plan in enumerate(plans):
-        for outcome in spread(partial(_object, plan), folders, workers):
-            found[which] += [outcome] if outcome is not None else []
-            done += 1
-            if progress is not None:
-                progress(done, len(folders) * len(plans))
+    folders = chosen_folders(data, objects)
+    rows = ((plan, each) for plan in plans for each in spread(partial(_object, plan), folders, workers))
+    found: dict[Plan, list[Outcome]] = {plan: [] for plan in plans}
+    for plan, outcome in told(rows, len(folders) * len(plans), progress):
+        found[plan] += [outcome] if outcome is not None else []
     head = {
         "bench": "held-object",
         "rules": RULES,
         "timing": {"what": TIMING, "repeats": repeats},
         "seeds": list(range(seeds)),
     }
-    result = head | _result(plans[0], found[0]) | {"table_iv": table_iv()}
+    result = head | _result(plans[0], found[plans[0]]) | {"table_iv": table_iv()}
     if len(plans) > 1:
-        result["mixed_merge"] = _result(plans[1], found[1])
+        result["mixed_merge"] = _result(plans[1], found[plans[1]])
     return result
 
 
@@ -124,13 +120,6 @@ def _plan(parts: str, noises: tuple[str, ...], seeds: int, methods: tuple[str, .
         parts, PART_METHODS
     )
     return Plan(parts, noises or SCENARIOS, seeds, methods or everything, repeats)
-
-
-def _chosen(folders: list[Path], names: Sequence[str]) -> list[Path]:
-    """Return the folders called `names`, all where none is named."""
-    there = {folder.name: folder for folder in folders}
-    require_known("object", names, tuple(there))
-    return [there[name] for name in names] or folders
 
 
 @dataclass(frozen=True, eq=False)

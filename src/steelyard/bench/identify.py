@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from steelyard import evaluate
-from steelyard.bench.asked import Progress
+from steelyard.bench.asked import Progress, told
 from steelyard.bench.logs import long_log
 from steelyard.bench.logs.methods import Method, choose, own_methods
 from steelyard.bench.logs.peers import peer_methods
+from steelyard.bench.middles import middle_of
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
 from steelyard.errors import SteelyardError
@@ -99,7 +100,7 @@ def _rows(
     objects, motions, noises = names
     cases = [(o, m, n, s) for m in motions for n in noises for o in objects for s in seeds]
     rows: list[Row] = []
-    for done, (name, motion, noise, seed) in enumerate(cases, start=1):
+    for name, motion, noise, seed in told(cases, len(cases), progress):
         log, true = simulate_log(name, motion, noise, seed)
         head = {"object": name, "motion": motion, "noise": noise, "seed": int(seed)}
         for method in methods.values():
@@ -107,8 +108,6 @@ def _rows(
             if seed == seeds[0] and "failure" not in row:
                 row |= _times(method, log, name == objects[0], repeats)
             rows.append(head | row)
-        if progress is not None:
-            progress(done, len(cases))
     return rows
 
 
@@ -141,17 +140,12 @@ def medians(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, Row]]]:
     out: dict[str, dict[str, dict[str, Row]]] = {}
     for (motion, noise, method), group in groups.items():
         out.setdefault(motion, {}).setdefault(noise, {})[method] = {
-            **{key: _median(group, key) for key in (*SCORES, *TIMES)},
+            **{key: middle_of([row[key] for row in group], np.median) for key in (*SCORES, *TIMES)},
             "consistent_pct": 100 * sum(row["consistent"] for row in group) / len(group),
             "failures": sum("failure" in row for row in group),
             "runs": len(group),
         }
     return out
-
-
-def _median(rows: Sequence[Row], key: str) -> float | None:
-    values = [row[key] for row in rows if row[key] is not None]
-    return float(np.median(values)) if values else None
 
 
 def speed(median: dict[str, dict[str, dict[str, Row]]]) -> dict[str, float]:

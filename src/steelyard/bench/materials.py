@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, require_one
+from steelyard.bench.asked import Progress, require_one, told
 from steelyard.bench.objects.cases import SAME_DENSITY, Case, load_case, noisy_rows
+from steelyard.bench.objects.folders import chosen_folders
 from steelyard.errors import BadValue, SteelyardError
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_masses import PartMasses
-from steelyard.io.object_folders import object_folders
 from steelyard.parts.material import Material
 
 NOISE = "low"
@@ -47,15 +47,13 @@ def run(
 ) -> dict[str, Any]:
     """Return how often the right density is picked, over all objects and for each. Empty `objects` means all."""
     require_one("seed", seeds)
-    folders = [folder for folder in object_folders(data) if not objects or folder.name in objects]
+    folders = chosen_folders(data, objects)
     found: dict[str, Any] = {}
     failures: list[str] = []
-    for done, folder in enumerate(folders, start=1):
+    for folder in told(folders, len(folders), progress):
         case = load_case(folder, "truth")
         if case is not None and case.part_masses is not None:
             found[folder.name] = _object(case, seeds, failures)
-        if progress is not None:
-            progress(done, len(folders))
     return {
         "bench": "materials",
         "rules": RULES,

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, require_one
+from steelyard.bench.asked import Progress, require_one, told
 from steelyard.bench.coverage import HALF_WIDTH, object_scale, rms_error, widths
 from steelyard.bench.objects.cases import Case, load_case, noisy_rows
 from steelyard.bench.objects.part_timing import TIMING, timings
-from steelyard.bench.pool import batches
+from steelyard.bench.pool import BATCH, spread
 from steelyard.bench.timing import REPEATS
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError
@@ -60,7 +60,7 @@ def run(
 ) -> dict[str, Any]:
     """Return coverage and widths per noise scenario, truth and kind over `seeds` logs, and times per object.
 
-    `repeats` = 0 leaves the times out. `progress(done, fits)` is called after every batch.
+    `repeats` = 0 leaves the times out. `progress(done, fits)` is called after every fit.
     """
     require_one("seed", seeds)
     usable = [name for name in NOISE if any(noise_std(name))]
@@ -69,18 +69,10 @@ def run(
             raise BadValue(f"There is no noise scenario '{name}' here; there are: {', '.join(usable)}.")
     folders = object_folders(data)
     times = timings(folders, repeats) if repeats else {}
-    cases: dict[str, Any] = {}
-    done, total = 0, seeds * len(noises) * len(TRUTHS)
-    for noise in noises:
-        for truth in TRUTHS:
-            jobs = [(folders[k % len(folders)], k, noise, truth) for k in range(seeds)]
-            found: list[Outcome | str] = []
-            for outcomes in batches(_fit, jobs, workers):
-                found += outcomes
-                done += len(outcomes)
-                if progress is not None:
-                    progress(done, total)
-            cases[f"{noise}, {truth}"] = summary(found)
+    asked = [(noise, truth) for noise in noises for truth in TRUTHS]
+    jobs = [(folders[k % len(folders)], k, *case) for case in asked for k in range(seeds)]
+    fits = list(told(spread(_fit, jobs, workers, BATCH), len(jobs), progress))
+    cases = {", ".join(case): summary(fits[k * seeds : (k + 1) * seeds]) for k, case in enumerate(asked)}
     return {
         "bench": "part-coverage",
         "rules": RULES,

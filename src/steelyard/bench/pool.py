@@ -4,31 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from multiprocessing import get_context
 from typing import TypeVar
 
 Job = TypeVar("Job")
 Row = TypeVar("Row")
-
-
 BATCH = 20  # jobs: calls that each are done sooner than they are handed over
 
 
-def spread(call: Callable[[Job], Row], jobs: Sequence[Job], workers: int) -> Iterator[Row]:
-    """Yield what `call` makes of every job, in their order."""
+def spread(call: Callable[[Job], Row], jobs: Sequence[Job], workers: int, batch: int = 1) -> Iterator[Row]:
+    """Yield what `call` makes of every job, in their order; processes are handed `batch` of them at a time."""
     if workers == 1:
         yield from map(call, jobs)
         return
     # Fresh processes: a fork would copy the locks of BLAS and Numba threads.
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(call, jobs)
-
-
-def batches(call: Callable[[Job], Row], jobs: Sequence[Job], workers: int) -> Iterator[list[Row]]:
-    """Yield what `call` makes of the jobs, in their order, a batch at a time."""
-    yield from spread(partial(_each, call), [jobs[k : k + BATCH] for k in range(0, len(jobs), BATCH)], workers)
-
-
-def _each(call: Callable[[Job], Row], jobs: Sequence[Job]) -> list[Row]:
-    return [call(job) for job in jobs]
+        yield from pool.map(call, jobs, chunksize=batch)

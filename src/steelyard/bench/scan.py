@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress
+from steelyard.bench.asked import Progress, told
+from steelyard.bench.middles import middle_of
 from steelyard.evaluate import score
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_aware import NoiseAware
@@ -51,15 +52,14 @@ def run(
 ) -> dict[str, Any]:
     """Return rows per tool, how many volumes are within bounds, and the median time of each stage."""
     names = tuple(tools) or tuple(FAMILIES)
-    rows = []
-    for done, name in enumerate(names, start=1):
-        rows.append(_row(name, seed, count, pose_std, warm=done == 1))
-        if progress:
-            progress(done, len(names))
+    rows: list[dict[str, Any]] = []
+    for name in told(names, len(names), progress):
+        rows.append(_row(name, seed, count, pose_std, warm=not rows))
     ratios = np.array([row["volume_ratio"] for row in rows])
     stages = {stage: float(np.median([row["cpu_s"][stage] for row in rows])) for stage in rows[0]["cpu_s"]}
     answers = {
-        key: {name: _mean([row[key][name] for row in rows]) for name in SCORES} for key in ("answer", "without_shape")
+        key: {name: middle_of([row[key][name] for row in rows]) for name in SCORES}
+        for key in ("answer", "without_shape")
     }
     return {
         "objects": rows,
@@ -69,12 +69,6 @@ def run(
         "stages": stages,
         "rules": RULES,
     }
-
-
-def _mean(values: list[float | None]) -> float | None:
-    """Return the mean of those that are numbers, None where there are none."""
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
 
 
 def _row(name: str, seed: int, count: int, pose_std: tuple[float, float], warm: bool) -> dict[str, Any]:

@@ -11,17 +11,16 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from steelyard.bench.asked import Progress
+from steelyard.bench.asked import Progress, told
+from steelyard.bench.objects.folders import chosen_folders
+from steelyard.bench.shapes.paper_parts import paper_parts, scores_of
 from steelyard.check import Array, Integers
 from steelyard.datasets.known_object import KnownObject
-from steelyard.errors import BadValue
 from steelyard.evaluate.segments import hausdorff_mm, score_segments
 from steelyard.evaluate.solids import score, true_solid, winding_of
-from steelyard.io.object_folders import object_folders, read_object
-from steelyard.parts.clustering import cluster
-from steelyard.parts.segment import coloured_pieces, nearest_cell, parts_of_pieces
+from steelyard.io.object_folders import read_object
+from steelyard.parts.segment import coloured_pieces, parts_of_pieces
 from steelyard.parts.segmentation import Segmentation
-from steelyard.parts.supervoxels import pieces_of_points, supervoxels
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.orient import oriented
 from steelyard.shape.tets import TetMesh
@@ -29,7 +28,6 @@ from steelyard.shape.volume import enclose
 from steelyard.spatial import Pose, Rotation, area_vectors
 
 REPEATS = 3
-DEPTH = 2  # of the tree: where the paper cuts it, four parts
 SURFACE_POINTS = 20_000
 OUTSIDE_POINTS = 300_000  # dense enough to give points of a cloud the normal where they lie
 TURNED_SEED = 11
@@ -84,19 +82,15 @@ def run(
     noise_mm      standard deviation added to every coordinate [mm]
     colour_noise  the same of every colour channel, 0..255
     """
-    folders = [folder for folder in object_folders(data) if not objects or folder.name in objects]
-    if not folders:
-        raise BadValue(f"no object folders to bench in {data}; asked for {list(objects) or 'all'}.")
+    folders = chosen_folders(data, objects)
     result: dict[str, Any] = {name: {} for name in ("objects", "htc_cold", "htc_warm")}
-    for done, folder in enumerate(folders, start=1):
+    for folder in told(folders, len(folders), progress):
         known = read_object(folder)
         cloud = _noisy(known.cloud, noise_mm, colour_noise)
-        row, solid = _ours(known, cloud, warm=done == 1)
+        row, solid = _ours(known, cloud, warm=not result["objects"])
         result["objects"][folder.name] = row
         for name in ("htc_cold", "htc_warm"):
             result[name][folder.name] = _published(known, solid, warm=name == "htc_warm")
-        if progress is not None:
-            progress(done, len(folders))
     return {
         **result,
         "mean": {name: _mean(result[name]) for name in ("objects", "htc_cold", "htc_warm")},
@@ -204,14 +198,10 @@ def _turned(true: Integers, cloud: Cloud) -> dict[str, float]:
 def _published(known: KnownObject, mesh: TetMesh, warm: bool) -> dict[str, Any]:
     """Return the row of the paper's clustering on our solid: four parts, from supervoxels or from single tets."""
     for _ in range(2):  # the first time compiles
-        start, piece = time.thread_time(), None
-        if warm:
-            cloud = Cloud(known.cloud.xyz, known.cloud.rgb)
-            piece = pieces_of_points(mesh, cloud, supervoxels(cloud))
-        tree = cluster(mesh, piece)
-        labels = tree.cut_at(tree.nodes_at_depth(DEPTH))
+        start = time.thread_time()
+        labels = paper_parts(mesh, Cloud(known.cloud.xyz, known.cloud.rgb) if warm else None)
         spent = time.thread_time() - start
-    scores = score_segments(known.cloud.labels, labels[nearest_cell(known.cloud.xyz, mesh.centroids)])
+    scores = scores_of(known, mesh, labels)
     return {
         "impurity": scores.impurity,
         "gce": scores.gce,

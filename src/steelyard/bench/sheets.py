@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from steelyard.bench.asked import Progress
+from steelyard.bench.asked import Progress, told
 from steelyard.bench.tables import block
 from steelyard.shape.volume import enclose
 from steelyard.workshop.sheets import KINDS, sheets
@@ -23,7 +23,7 @@ _COLUMNS = (("count", "count", 0), ("hits", "hits", 0), ("misses warned", "misse
 def run(count: int = 60, seed: int = 0, progress: Progress | None = None) -> dict[str, Any]:
     """Return a row per sheet, and per kind and for all: hits, misses, and how many of each carry the warning."""
     rows: list[dict[str, Any]] = []
-    for done, sheet in enumerate(sheets(count, seed), start=1):
+    for sheet in told(sheets(count, seed), count, progress):
         solid = enclose(sheet.cloud)
         ratio = solid.mesh.volume / sheet.volume
         rows.append({
@@ -32,8 +32,6 @@ def run(count: int = 60, seed: int = 0, progress: Progress | None = None) -> dic
             "hit": WITHIN[0] <= ratio <= WITHIN[1],
             "warned": any(finding.code == WARNING for finding in solid.findings),
         })  # fmt: skip
-        if progress:
-            progress(done, count)
     kinds = {kind: [row for row in rows if row["name"].startswith(kind)] for kind in KINDS}
     counts = {kind: _counts(chosen) for kind, chosen in {**kinds, "all": rows}.items()}
     return {"sheets": rows, "counts": counts, "seed": seed, "rules": RULES}

@@ -11,6 +11,7 @@ import numba
 import numpy as np
 from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
+from steelyard.bench.asked import Progress, told
 from steelyard.bench.shapes import hull_sets
 from steelyard.bench.shapes.plain_clustering import plain_cluster
 from steelyard.bench.timing import REPEATS, thread_ms
@@ -41,7 +42,7 @@ TIMING = (
 
 
 def run(
-    tets: int = 5000, many: int = 150_000, repeats: int = REPEATS, progress: Any = None, *, sets: int = 0
+    tets: int = 5000, many: int = 150_000, repeats: int = REPEATS, progress: Progress | None = None, *, sets: int = 0
 ) -> dict[str, Any]:
     """Return stage times, in-run ratios, and how `sets` sets of points compare with Qhull; 0 leaves a step out."""
     if tets < 100 or repeats < 1:
@@ -50,11 +51,9 @@ def run(
     if many:
         steps.append(partial(_large, many))
     found: dict[str, Any] = {"stages": {}, "ratios": {}, "timing": TIMING}
-    for k, step in enumerate(steps):
+    for step in told(steps, len(steps), progress):
         for name, part in step().items():
             found[name].update(part)
-        if progress is not None:
-            progress(k + 1, len(steps))
     if sets:
         found["hull_sets"] = hull_sets.run(sets, progress)
     return found

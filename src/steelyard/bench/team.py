@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, require_known, require_one
+from steelyard.bench.asked import Progress, require_known, require_one, told
+from steelyard.bench.middles import middle_of
 from steelyard.bench.pool import spread
+from steelyard.bench.teams.errors import grasp_errors, score
 from steelyard.bench.timing import thread_ms
 from steelyard.errors import SteelyardError
 from steelyard.logs.team_log import TeamLog
-from steelyard.simulate.team import TeamTrial, TeamTruth, simulate_team
+from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case
 from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
@@ -96,11 +98,7 @@ def run(
     require_known("method", methods, METHODS)
     chosen, wanted = tuple(cases) or tuple(CASES), tuple(methods) or tuple(METHODS)
     jobs = [(name, FIRST_SEED + k, wanted) for name in chosen for k in range(trials)]
-    rows: list[dict[str, Any]] = []
-    for done, found in enumerate(spread(trial, jobs, workers), start=1):
-        rows += found
-        if progress is not None:
-            progress(done, len(jobs))
+    rows = [row for found in told(spread(trial, jobs, workers), len(jobs), progress) for row in found]
     return {
         "bench": "team",
         "rules": RULES,
@@ -152,38 +150,14 @@ def trial(job: tuple[str, int, Sequence[str]]) -> list[dict[str, Any]]:
     return rows
 
 
-def score(made: TeamTrial, found: TeamEstimate) -> dict[str, Any]:
-    """Return the errors of one answer; inertia is None where it was not identified."""
-    turned, moved, share = grasp_errors(made.truth, found.poses_of(made.log.names))
-    body, moments = made.truth.body, found.principal_moments
-    return {
-        "rotation_deg": turned,
-        "position_mm": moved,
-        "position_pct": share,
-        "mass_pct": 100 * abs(found.mass / float(body.mass) - 1),
-        "com_mm": 1000 * float(np.linalg.norm(found.com - body.com)),
-        "inertia_pct": None if moments is None else (100 * np.abs(moments / made.truth.moments - 1)).tolist(),
-    }
-
-
-def grasp_errors(truth: TeamTruth, found: Pose) -> tuple[float, float, float]:
-    """Return mean angle [deg], distance [mm] and distance [% of the true one] over the grasps that are not at R."""
-    far = np.linalg.norm(truth.grasps.position, axis=1)
-    others = far > 0
-    angle = np.rad2deg((truth.grasps.rotation.inverse() @ found.rotation).angle())[others]
-    gap = np.linalg.norm(found.position - truth.grasps.position, axis=1)[others]
-    return float(angle.mean()), float(1000 * gap.mean()), float(100 * (gap / far[others]).mean())
-
-
 def summary(rows: Sequence[Mapping[str, Any]], name: str, method: str) -> dict[str, Any]:
     """Return the means over trials of one method in one case, the median time, and how many trials it answered."""
     mine = [row for row in rows if row["case"] == name and row["method"] == method]
     answered = [row for row in mine if "error" not in row]
     out: dict[str, Any] = {"trials": len(mine), "answered": len(answered)}
     for metric in METRICS:
-        values = [row[metric] for row in answered if row[metric] is not None]
         middle = np.median if metric == "time_s" else np.mean
-        out[metric] = np.asarray(middle(values, axis=0)).tolist() if values else None
+        out[metric] = middle_of([row[metric] for row in answered], middle)
     return out
 
 

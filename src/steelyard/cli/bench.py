@@ -11,13 +11,11 @@ import click
 from steelyard.bench.timing import one_thread
 from steelyard.cli.console import print_json, progress_bar, say
 from steelyard.cli.groups import Group
-from steelyard.cli.options import HELP, JSON
+from steelyard.cli.options import HELP, JSON, PATH
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
-_FOLDERS = click.option(
-    "--data", required=True, type=click.Path(path_type=Path), help="Folder of object folders, or one of them."
-)
+_FOLDERS = click.option("--data", required=True, type=PATH, help="Folder of object folders, or one of them.")
 _OBJECTS = click.option("--objects", multiple=True, help="Only these objects (repeat the option).")
 _METHODS = click.option("--methods", multiple=True, help="Only these methods.")
 
@@ -25,7 +23,7 @@ _METHODS = click.option("--methods", multiple=True, help="Only these methods.")
 def _count(name: str, default: int, said: str, *, least: int = 1, into: str | None = None) -> Callable[[Verb], Verb]:
     """Return the option of a whole number from `least` on; `into` is the argument it goes to, where not of its name."""
     names = (name,) if into is None else (name, into)
-    return click.option(*names, type=click.IntRange(min=least), default=default, show_default=True, help=said)
+    return click.option(*names, type=click.IntRange(min=least), default=default, help=said)
 
 
 _WORKERS = _count("--workers", 2, "Processes.")
@@ -52,7 +50,7 @@ def bench() -> None:
 @click.option("--noise", "noises", multiple=True, help="Only these noise levels.")
 @_METHODS
 @_count("--million", 1_000_000, "Rows of the long log.", least=0)
-@click.option("--data", type=click.Path(path_type=Path), help="Has no effect: the bench makes its own data.")
+@click.option("--data", type=PATH, help="Has no effect: the bench makes its own data.")
 @JSON
 def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> None:
     """Ten bodies, three motions, four noise levels: our methods and, where installed, the peers'."""
@@ -67,13 +65,12 @@ def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> No
 
 @bench.command()
 @_count("--seeds", 1000, "Seeds 0, 1, ...")
-@click.option("--motion", default="stop_go", show_default=True, help="Motion of the logs, as in bench identify.")
-@click.option("--noise", default="moderate", show_default=True, help="Noise level, as in bench identify.")
+@click.option("--motion", default="stop_go", help="Motion of the logs, as in bench identify.")
+@click.option("--noise", default="moderate", help="Noise level, as in bench identify.")
 @click.option(
     "--spectrum",
     type=click.Choice(["white", "2hz", "both"]),
     default="both",
-    show_default=True,
     help="White noise, noise correlated below 2 Hz, or each in turn.",
 )
 @click.option("--all-objects", is_flag=True, help="Every seed on all ten objects instead of one in turn.")
@@ -82,7 +79,6 @@ def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> No
     "--bias",
     type=click.Choice(["free", "none"]),
     default="none",
-    show_default=True,
     help="The sensor's bias is estimated, or known to be none.",
 )
 @_count("--workers", 1, "Processes.")
@@ -105,7 +101,6 @@ def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **ch
     "--parts",
     type=click.Choice(["segmented", "truth", "truth-split", "truth-merged"]),
     default="segmented",
-    show_default=True,
     help="Parts: found in the clouds with labels unseen, the true ones, each cut in pieces, or joined.",
 )
 @_count("--seeds", 5, "Seeds 0, 1, ...")
@@ -126,7 +121,7 @@ def held_object(data: Path, as_json: bool, **choices: Any) -> None:
 @bench.command("part-coverage")
 @_FOLDERS
 @_count("--seeds", 1000, "Logs per case.")
-@click.option("--noise", "noises", default="low,high", show_default=True, help="Scenarios, with commas between them.")
+@click.option("--noise", "noises", default="low,high", help="Scenarios, with commas between them.")
 @_WORKERS
 @JSON
 def part_coverage(data: Path, seeds: int, noises: str, workers: int, as_json: bool) -> None:
@@ -155,10 +150,8 @@ def materials(data: Path, seeds: int, as_json: bool) -> None:
 @bench.command()
 @_FOLDERS
 @_OBJECTS
-@click.option("--noise-mm", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Noise of the points.")
-@click.option(
-    "--colour-noise", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Of channels 0..255."
-)
+@click.option("--noise-mm", type=click.FloatRange(min=0), default=0.0, help="Noise of the points.")
+@click.option("--colour-noise", type=click.FloatRange(min=0), default=0.0, help="Of channels 0..255.")
 @JSON
 def segment(data: Path, as_json: bool, **choices: Any) -> None:
     """Parts of unlabelled clouds against the true ones, beside the paper's Tables I and II."""
@@ -217,8 +210,8 @@ def sheets(count: int, seed: int, as_json: bool) -> None:
 @click.option("--tools", multiple=True, help="Only these families (repeat the option).")
 @_count("--seed", 0, "Seed of pose, arc and noise.", least=0)
 @_count("--views", 127, "Images per scan.", least=8, into="count")
-@click.option("--pose-mm", type=float, default=0.0, show_default=True, help="Error of the reported camera positions.")
-@click.option("--pose-deg", type=float, default=0.0, show_default=True, help="Error of the reported camera rotations.")
+@click.option("--pose-mm", type=float, default=0.0, help="Error of the reported camera positions.")
+@click.option("--pose-deg", type=float, default=0.0, help="Error of the reported camera rotations.")
 @JSON
 def scan(tools: tuple[str, ...], pose_mm: float, pose_deg: float, as_json: bool, **choices: Any) -> None:
     """Built tools scanned by simulated views on a table: volume against the truth, CPU of every stage."""

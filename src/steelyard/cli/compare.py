@@ -8,12 +8,12 @@ from pathlib import Path
 import click
 
 from steelyard.cli.console import print_json
-from steelyard.cli.options import HELP, JSON
+from steelyard.cli.options import HELP, JSON, PATH
 
 
 @click.command(context_settings=HELP)
-@click.argument("first", type=click.Path(path_type=Path))
-@click.argument("second", type=click.Path(path_type=Path))
+@click.argument("first", type=PATH)
+@click.argument("second", type=PATH)
 @click.option("--any-grasp", is_flag=True, help="Compare only mass and principal moments: the grasps may differ.")
 @JSON
 def compare(first: Path, second: Path, any_grasp: bool, as_json: bool) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from steelyard.cli.console import STYLED, command_line, print_json, require_output, say, say_if_compiling
-from steelyard.cli.options import HELP, JSON
+from steelyard.cli.options import HELP, JSON, PATH
 
 if TYPE_CHECKING:
     from steelyard.identify.estimate import Estimate
@@ -27,13 +27,13 @@ SEED = 0
 
 @click.command(context_settings=HELP)
 @click.argument("story", type=click.Choice(["held-object", "team"]), default="held-object")
-@click.option("--seed", type=int, default=SEED, show_default=True, help="Seed of the made noise.")
+@click.option("--seed", type=int, default=SEED, help="Seed of the made noise.")
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), show_default="report.html; team.html for team",
+    "-o", "--output", type=PATH, show_default="report.html; team.html for team",
     help="The page to write.",
 )  # fmt: skip
 @click.option(
-    "--keep", type=click.Path(path_type=Path), metavar="DIR",
+    "--keep", type=PATH, metavar="DIR",
     help="Keep the made files and the result in this folder; of the hammer the views too (20 MB, needs "
     "steelyard[images]).",
 )  # fmt: skip

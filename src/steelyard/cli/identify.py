@@ -9,21 +9,20 @@ from typing import Any, NoReturn, cast
 import click
 
 from steelyard.cli.console import STYLED, print_json, require_output, say, say_if_compiling
-from steelyard.cli.options import HELP, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
+from steelyard.cli.options import HELP, PATH, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
 from steelyard.errors import BadValue, NoDescription
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 
 
 @click.command(context_settings=HELP)
-@click.argument("log", required=False, type=click.Path(path_type=Path))
+@click.argument("log", required=False, type=PATH)
 @STREAM_FOLDER
-@click.option("--method", type=click.Choice(METHODS), default="auto", show_default=True, help="Estimator.")
+@click.option("--method", type=click.Choice(METHODS), default="auto", help="Estimator.")
 @click.option(
     "--bias",
     type=click.Choice(["free", "none"]),
     default="free",
-    show_default=True,
     help="Estimate the sensor's bias, or trust that it is tared.",
 )
 @click.option("--drift", is_flag=True, help="Let the bias grow linearly over the log.")
@@ -31,22 +30,21 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
     "--gravity",
     type=click.Choice(["given", "unknown"]),
     default="given",
-    show_default=True,
     help="Trust the direction of gravity in the description, or estimate it (tilted base).",
 )
 @click.option(
     "--tool",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Result (.json) or log of the gripper alone: taken away, sharing one sensor bias.",
 )
 @click.option(
     "--parts",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Parts of the object: a mesh (.ply) whose faces carry part numbers, or parts.npz of `steelyard segment`.",
 )
 @click.option(
     "--scan",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Cloud of the object (.ply, .pcd, .npz) or folder of views: closed, cut into parts, and used for the inertia.",
 )
 @click.option(

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import click
 
-HELP = {"help_option_names": ["-h", "--help"]}
+HELP = {"help_option_names": ["-h", "--help"], "show_default": True}
+PATH = click.Path(path_type=Path)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 RESULT_AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
-RESULT_FILE = click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the result as JSON.")
-STREAM_FOLDER = click.option(
-    "--data", type=click.Path(path_type=Path), help="Folder that relative paths in the description start from."
-)
+RESULT_FILE = click.option("-o", "--output", type=PATH, help="Write the result as JSON.")
+STREAM_FOLDER = click.option("--data", type=PATH, help="Folder that relative paths in the description start from.")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from steelyard.cli.console import command_line, print_json, require_output, say, say_if_compiling
-from steelyard.cli.options import HELP, JSON
+from steelyard.cli.options import HELP, JSON, PATH
 from steelyard.errors import BadValue
 
 if TYPE_CHECKING:
@@ -24,29 +24,28 @@ if TYPE_CHECKING:
     from steelyard.spatial import Pose
     from steelyard.team.estimate import TeamEstimate
 
-_FILE = click.Path(path_type=Path)
 _SAME_VOLUME = 0.02
 # [m] Centroids of the same parts in the same place agree to rounding; a page does not show less.
 _SAME_PLACE = 1e-3
 
 
 @click.command(context_settings=HELP)
-@click.argument("result", type=_FILE)
-@click.option("--parts", type=_FILE, help="Parts to draw: parts.npz, or a mesh (.ply) with a part per face.")
+@click.argument("result", type=PATH)
+@click.option("--parts", type=PATH, help="Parts to draw: parts.npz, or a mesh (.ply) with a part per face.")
 @click.option(
     "--scan",
-    type=_FILE,
+    type=PATH,
     help="Cloud of the object (.ply, .pcd, .npz): its points, and colours of --parts. "
     "Without --parts the cloud, or a folder of views, is cut into parts as identify --scan does.",
 )
-@click.option("--log", type=_FILE, help="The log of the result: residuals over time, and where the object sits.")
-@click.option("--data", type=_FILE, help="Folder that relative paths in the log's description start from.")
-@click.option("--tool", type=_FILE, help="Result (.json) of the gripper that was taken away: the log weighs it too.")
+@click.option("--log", type=PATH, help="The log of the result: residuals over time, and where the object sits.")
+@click.option("--data", type=PATH, help="Folder that relative paths in the log's description start from.")
+@click.option("--tool", type=PATH, help="Result (.json) of the gripper that was taken away: the log weighs it too.")
 @click.option("--pose-in-sensor", metavar="POSE", help="Where the object sits in the sensor, as for identify.")
-@click.option("--truth", type=_FILE, help="truth.json of an object folder: the true object beside the answer.")
+@click.option("--truth", type=PATH, help="truth.json of an object folder: the true object beside the answer.")
 @click.option("--rival", "rivals", multiple=True, metavar="NAME=FILE", help="Another method's result; may be repeated.")
 @click.option("--title", help="Heading of the page.")
-@click.option("-o", "--output", type=_FILE, default=Path("report.html"), show_default=True, help="The page to write.")
+@click.option("-o", "--output", type=PATH, default=Path("report.html"), help="The page to write.")
 @JSON
 def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None, data: Path | None,
            tool: Path | None, pose_in_sensor: str | None, truth: Path | None, rivals: tuple[str, ...],

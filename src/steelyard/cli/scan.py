@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from steelyard.cli.console import STYLED, command_line, print_json, progress_bar, require_output, say_if_compiling
-from steelyard.cli.options import HELP, JSON
+from steelyard.cli.options import HELP, JSON, PATH
 
 if TYPE_CHECKING:
     from steelyard.shape.scan import Scan
 
 
 @click.command(context_settings=HELP)
-@click.argument("views", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the cloud (.ply or .npz).")
-@click.option(
-    "--points", type=click.IntRange(200, 50_000), default=3000, show_default=True, help="About so many points."
-)
+@click.argument("views", type=PATH)
+@click.option("-o", "--output", type=PATH, help="Write the cloud (.ply or .npz).")
+@click.option("--points", type=click.IntRange(200, 50_000), default=3000, help="About so many points.")
 @JSON
 def scan(views: Path, output: Path | None, points: int, as_json: bool) -> None:
     """Fuse the posed RGB-D images in the folder VIEWS into one cloud of the object on the table, underside closed."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from steelyard.cli.console import STYLED, print_json, require_output, say_if_compiling
-from steelyard.cli.options import HELP, JSON
+from steelyard.cli.options import HELP, JSON, PATH
 from steelyard.findings import counted
 
 if TYPE_CHECKING:
@@ -16,16 +16,15 @@ if TYPE_CHECKING:
 
 
 @click.command(context_settings=HELP)
-@click.argument("scan", type=click.Path(path_type=Path))
+@click.argument("scan", type=PATH)
 @click.option("--parts", type=click.IntRange(1, 40), help="How many parts; chosen by shape and colour where left out.")
 @click.option(
     "--cells",
     type=click.Choice(["delaunay", "ftetwild", "tetgen"]),
     default="delaunay",
-    show_default=True,
     help="Fill the volume anew with the cells of this mesher, where it is installed (TetGen is under the AGPL).",
 )
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write parts.npz.")
+@click.option("-o", "--output", type=PATH, help="Write parts.npz.")
 @JSON
 def segment(scan: Path, parts: int | None, cells: str, output: Path | None, as_json: bool) -> None:
     """Close a SCAN, a cloud (.ply, .pcd, .npz) or a folder of views, and cut it into homogeneous parts."""

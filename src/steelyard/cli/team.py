@@ -7,16 +7,16 @@ from pathlib import Path
 import click
 
 from steelyard.cli.console import STYLED, print_json, require_output, say_if_compiling
-from steelyard.cli.options import HELP, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
+from steelyard.cli.options import HELP, PATH, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
 
 METHODS = ("joint", "paper")
 
 
 @click.command(context_settings=HELP)
-@click.argument("team", type=click.Path(path_type=Path))
+@click.argument("team", type=PATH)
 @STREAM_FOLDER
 @click.option(
-    "--method", type=click.Choice(METHODS), default="joint", show_default=True,
+    "--method", type=click.Choice(METHODS), default="joint",
     help="One joint estimate, or the paper's steps one after another.",
 )  # fmt: skip
 @RESULT_FILE

@@ -11,7 +11,7 @@ import click
 
 from steelyard.cli.console import command_line, print_json, progress_bar, say, say_if_compiling
 from steelyard.cli.groups import Group
-from steelyard.cli.options import HELP, JSON
+from steelyard.cli.options import HELP, JSON, PATH
 from steelyard.errors import BadValue
 from steelyard.findings import counted
 
@@ -25,31 +25,26 @@ def workshop() -> None:
 
 
 @workshop.command()
-@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.argument("folder", type=PATH, metavar="DIR")
 @click.option(
     "--variants",
     type=click.IntRange(min=0),
     default=0,
-    show_default=True,
     help="Random variants of each family (sizes, materials, colours) instead of the nominal tools.",
 )
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of variants, clouds and noise."
-)
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of variants, clouds and noise.")
 @click.option("--tools", multiple=True, help="Only these families, such as hammer (repeat the option).")
 @click.option("--graded", is_flag=True, help="The graded families: tools with parts that are not homogeneous.")
 @click.option(
     "--motion",
     type=click.Choice(["paper", "slow", "static"]),
     default="paper",
-    show_default=True,
     help="Motion of the log: the paper's brisk one, one below 0.25 m/s everywhere, or still poses only.",
 )
 @click.option(
     "--noise",
     type=click.Choice(["none", "low", "moderate", "high"]),
     default="none",
-    show_default=True,
     help="Noise of the log that log.toml describes, as in the paper's Table III; motion.npz stays exact.",
 )
 @click.option(

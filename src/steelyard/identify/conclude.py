@@ -1,10 +1,9 @@
-"""From a solution to an Estimate: covariance, evidence and which numbers the data fix."""
+"""From a solution to an Estimate: covariance, evidence, and an error where the data do not fix mass and centre."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 
 from steelyard.check import Array
@@ -13,32 +12,19 @@ from steelyard.evidence import Evidence
 from steelyard.findings import Finding, counted
 from steelyard.identify.bars.correlated import NOTHING, Score
 from steelyard.identify.bars.holdout import leave_one_out
+from steelyard.identify.bars.widened import widened
 from steelyard.identify.cost import noise_cost
-from steelyard.identify.cost.dense import eigen, product, product_transposed
 from steelyard.identify.cost.linear import fitted, inverse_scaled, nonnegative, normal_equations, without_bias
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import ADD_POSES, Problem
+from steelyard.identify.sight import Sight
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
-from steelyard.inertia.people import ENTRIES, parameter_jacobian, people_jacobian
+from steelyard.inertia.people import ENTRIES
 from steelyard.logs.log import Mask
 
-# Identified means: the data alone, without prior, give one standard deviation below these shares of
-# the mass, of the radius of gyration, and of half the trace of the inertia about the centre of mass.
-MASS_SHARE, COM_SHARE, INERTIA_SHARE = 0.1, 0.2, 0.1
-SHARES = np.repeat([MASS_SHARE, COM_SHARE, INERTIA_SHARE], [1, 3, 6])
-SMALLEST_RADIUS = 0.02
-# There is no answer at all where mass or centre of mass are looser than these shares of the same sizes.
+# There is no answer at all where mass or centre of mass are looser than these shares of their natural sizes.
 LOST_MASS, LOST_COM = 1 / 3, 2.5
-# Fewer blocks left out in turn say too little about error bars; below this factor they agree.
-ENOUGH_BLOCKS, WORTH_WIDENING = 10, 1.5
-# Share of its size that no number is known better than.
-SMALLEST_STD = 1e-9
-# A direction counts toward the rank when the data fix it to half its natural size.
-RANK_INFORMATION = 4.0
-# Below this information (a third of the natural size to the power -2), or below this share of the best seen direction,
-# a direction is open.
-OPEN, UNSEEN = 0.1, 1e-12
 
 
 def _sandwich(H: Array, V: Array, solution: Solution) -> Array:
@@ -114,7 +100,7 @@ def conclude(
     # Whether the data fix a number is judged by noise alone: more poses cure no error that comes back with them.
     seen = meat if solution.weights is None else problem.plus_bias_prior(fit.white)
     F, G, _, _ = without_bias(problem.plus_bias_prior(fit.information), seen)
-    sight = Sight(*_sight(F, G, solution.linear[:10]))
+    sight = Sight.of(F, G, solution.linear[:10])
     if response is None:
         _require_answer(sight, problem)
     estimate = Estimate(
@@ -134,136 +120,6 @@ def conclude(
     if left_out:
         estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out))
     return widened(estimate.with_findings(*_findings(estimate))) if response is None else estimate
-
-
-def widened(estimate: Estimate) -> Estimate:
-    """Return the estimate with error bars at least as wide as leaving blocks out shows, where there are enough blocks.
-
-    What the model leaves out (a soft wrist, cross-talk) is no noise, and only differs from one stretch to the next.
-    With a shape, too: what the log says of mass and centre is wrong by as much.
-    """
-    return _each_widened(_all_widened(estimate))
-
-
-def _all_widened(estimate: Estimate) -> Estimate:
-    """Return the estimate with all bars wider alike, where leaving blocks out moves half of the numbers by more."""
-    moved, known = _moved(estimate), estimate.identified
-    if moved is None or not known.any() or (factor := float(np.median(moved[known]))) < WORTH_WIDENING:
-        return estimate
-    note = f"error bars are {factor:.1f} times those of noise alone: leaving blocks out moves the answer that much"
-    return replace(
-        estimate,
-        covariance=factor**2 * estimate.covariance,
-        bias_covariance=factor**2 * estimate.bias_covariance,
-        cross_covariance=factor**2 * estimate.cross_covariance,
-        part_covariance=None if estimate.part_covariance is None else factor**2 * estimate.part_covariance,
-        parts=tuple(replace(part, std=factor * part.std) for part in estimate.parts),
-        notes=(*estimate.notes, note),
-    )
-
-
-def _each_widened(estimate: Estimate) -> Estimate:
-    """Return the estimate with no number's bar narrower than leaving blocks out shows; correlations are kept.
-
-    What the model leaves out (an arm that swings after a stop) moves some numbers more than others.
-    """
-    moved = _moved(estimate)
-    if moved is None:
-        return estimate
-    factor = np.where(estimate.identified, np.maximum(moved, 1.0), 1.0)
-    phi = estimate.parameters.vector.copy()
-    stretch = parameter_jacobian(phi) @ (factor[:, None] * people_jacobian(phi))
-    return replace(
-        estimate,
-        covariance=stretch @ estimate.covariance @ stretch.T,
-        cross_covariance=stretch @ estimate.cross_covariance,
-    )
-
-
-def _moved(estimate: Estimate) -> Array | None:
-    """Return by how many of its bars leaving blocks out moves each number (10,), None where blocks are few."""
-    jackknife = estimate.evidence.jackknife_people
-    if jackknife is None or estimate.evidence.blocks < ENOUGH_BLOCKS:
-        return None
-    # A channel that holds exact zeros has no noise at all, and nothing to be a multiple of.
-    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector.copy())
-    return np.asarray(jackknife / np.maximum(estimate.std, least))
-
-
-@dataclass(frozen=True, eq=False)
-class Sight:
-    """What the data alone see: rank, condition, std (10,) of mass, com, inertia about the CoM, and their sizes."""
-
-    rank: int
-    condition: float
-    std: Array
-    sizes: Array
-
-    @property
-    def identified(self) -> Mask:
-        """Which of the ten the data fix."""
-        return identified(self.std, self.sizes)
-
-
-@numba.njit(cache=True)
-def natural_sizes(phi: Array) -> Array:
-    """Return (10,) mass [kg], radius of gyration [m] for com x y z, half the trace of the inertia about it."""
-    mass = max(abs(phi[0]), 1e-6)
-    square = phi[1] * phi[1] + phi[2] * phi[2] + phi[3] * phi[3]
-    trace = abs((phi[4] + phi[7] + phi[9]) / 2 - square / mass)
-    out = np.empty(10)
-    out[0] = mass
-    for i in range(1, 4):
-        out[i] = max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
-    for i in range(4, 10):
-        out[i] = max(trace, mass * SMALLEST_RADIUS**2)
-    return out
-
-
-def identified(std: Array, sizes: Array) -> Mask:
-    """Return which of mass, com and inertia about the CoM (10,) have standard deviations small beside their sizes."""
-    return np.asarray(std < SHARES * sizes)
-
-
-@numba.njit(cache=True)
-def _sight(F: Array, G: Array, phi: Array) -> tuple[int, float, Array, Array]:
-    """Return the fields of `Sight` from information and score variance (10, 10) of phi, the bias projected out.
-
-    In natural units (mass m, length r, the radius of gyration) an eigenvalue 1 fixes a direction to its own size.
-    """
-    sizes = natural_sizes(phi)
-    natural, scaled = np.empty(10), np.empty((10, 10))
-    for i in range(10):
-        natural[i] = sizes[i] if i == 0 else sizes[0] * sizes[1] * (1.0 if i < 4 else sizes[1])
-    for i in range(10):
-        for j in range(10):
-            scaled[i, j] = F[i, j] * natural[i] * natural[j]
-    values, vectors = eigen(scaled)
-    into = np.empty((10, 10))
-    for i in range(10):
-        for k in range(10):
-            into[i, k] = natural[i] * vectors[i, k]
-    directions = product(people_jacobian(phi), into)
-    # Directions that the data leave open may be off by several times their natural size, not by anything at all.
-    least = max(OPEN, UNSEEN * values[-1])
-    seen, open_end, rank, weakest = np.zeros((10, 10)), np.zeros(10), 0, np.inf
-    for k in range(10):
-        if values[k] > RANK_INFORMATION:
-            rank += 1
-            weakest = min(weakest, values[k])
-        for i in range(10):
-            if values[k] < least:
-                open_end[i] += directions[i, k] ** 2 / OPEN
-            else:
-                seen[i, k] = directions[i, k] / values[k]
-    bread = product_transposed(seen, into)
-    half, std = product(bread, G), np.empty(10)
-    for i in range(10):
-        variance = 0.0
-        for j in range(10):
-            variance += half[i, j] * bread[i, j]
-        std[i] = np.inf if open_end[i] > sizes[i] ** 2 else np.sqrt(max(variance, 0.0) + open_end[i])
-    return rank, np.sqrt(values[-1] / weakest) if rank else np.inf, std, sizes
 
 
 def _require_answer(sight: Sight, problem: Problem) -> None:

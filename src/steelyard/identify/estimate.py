@@ -11,7 +11,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.evidence import Evidence, PartMass
-from steelyard.findings import Finding, by_cause, codes
+from steelyard.findings import Finding, by_cause, codes, other_than
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.people import people_jacobian
 from steelyard.tables.words import in_a_line, in_words
@@ -103,8 +103,7 @@ class Estimate:
         if not known[4:].any():
             return self
         known[4:] = False
-        others = (finding for finding in self.findings if finding.code != "inertia-not-identified")
-        told = replace(self, identified=known, findings=tuple(others))
+        told = replace(self, identified=known, findings=other_than(self.findings, "inertia-not-identified"))
         return told.with_findings(Finding.of("inertia-not-identified", message))
 
     def with_remedies(self, remedies: Mapping[str, str]) -> Self:

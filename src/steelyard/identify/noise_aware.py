@@ -56,13 +56,12 @@ class NoiseAware(Estimator):
 
     def solution(self, problem: Problem) -> Solution:
         """Return the solution of a problem."""
-        rows = newton.Rows(problem.T, problem.scatter, problem.acceleration, problem.wrench)
         bias = problem.bias_prior
         priors = newton.Priors(self.prior, float(np.log(self.size)), self.size_spread**-2, bias.mean, bias.precision)
         linear = problem.reweighted(3)
         best = None
         for start in self._starts(linear):
-            found = newton.minimise(start, rows, priors, self.iterations)
+            found = newton.minimise(start, problem.rows, priors, self.iterations)
             if best is None or found[1] < best[1]:
                 best = found
             if found[2]:

@@ -14,7 +14,7 @@ from steelyard.identify.rest import RIPPLE, without_acceleration
 from steelyard.inertia.regressor import design
 from steelyard.logs.log import Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
-from steelyard.logs.noise import MOTION, WRENCH, as_declared, robust_std, rounding
+from steelyard.logs.noise import MOTION, WRENCH, as_declared, mean_heard, robust_std, rounding
 
 # Below this many rows the three axes share one level: noise that is slow leaves fewer independent rows than it seems,
 # and an axis that looks quiet by chance would be over-weighted.
@@ -179,9 +179,7 @@ def _lost(T: Array, scatter: Array, weights: Array, linear: Array) -> Array:
 
 def _of_heard(variance: Array, dead: Mask) -> Array:
     """Return the variances (6,) with those of dead channels at the mean of the channels beside them."""
-    heard = (~dead).reshape(2, 3)
-    mean = (variance.reshape(2, 3) * heard).sum(1) / np.maximum(heard.sum(1), 1)
-    return np.where(dead, np.repeat(mean, 3), variance)
+    return np.where(dead, np.repeat(mean_heard(variance, ~dead), 3), variance)
 
 
 def _pooled(variance: Array, rows: int) -> Array:

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import softmax
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
@@ -22,9 +23,10 @@ from steelyard.findings import OTHER_FRAME, Finding, counted
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared
-from steelyard.identify.masses.models import log_evidence, mixture
+from steelyard.identify.masses.models import log_evidence
 from steelyard.identify.masses.placement import ELSEWHERE, misplaced
 from steelyard.identify.masses.shape_error import MEASURED, ShapeError
+from steelyard.identify.mixture import mixture
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.problem import Problem
 from steelyard.identify.rest import without_noise_of_rest
@@ -88,8 +90,7 @@ class PartCuts:
         evidence = self._evidence(data, errors) + np.log(self._chance())
         if self.prior is not None:
             evidence = evidence + np.asarray(self.prior)[:, None]
-        weight = np.exp(evidence - evidence.max())
-        weight /= weight.sum()
+        weight = np.asarray(softmax(evidence))
         weight[weight < LEAST_WEIGHT] = 0.0
         return np.asarray(weight / weight.sum())
 

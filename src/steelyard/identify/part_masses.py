@@ -16,16 +16,16 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.evidence import PartMass
-from steelyard.findings import Finding
+from steelyard.findings import Finding, other_than
 from steelyard.identify.bars.correlated import score_in_time
 from steelyard.identify.bars.effective import Effective
-from steelyard.identify.conclude import conclude, widened
+from steelyard.identify.bars.widened import widened
+from steelyard.identify.conclude import conclude
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses
 from steelyard.identify.masses.loosened import loosened
-from steelyard.identify.masses.models import Masses, averaged_masses, free_masses, material_masses
+from steelyard.identify.masses.models import Masses, averaged_masses, free_masses, material_masses, weighed
 from steelyard.identify.masses.placement import consistent, misplaced, with_mass
 from steelyard.identify.masses.recentred import apart, followed, recentred
 from steelyard.identify.masses.shape_error import MEASURED, ShapeError, misdrawn
@@ -188,7 +188,7 @@ class PartMasses:
             found = uneven(seen, self.parts)
             if found is not None:
                 # Masses have changed: which are zero is asked anew.
-                others = (f for f in findings if f.code not in ("part-not-homogeneous", "part-zero-mass"))
+                others = other_than(findings, "part-not-homogeneous", "part-zero-mass")
                 text = " ".join(filter(None, (misplaced(seen, self.parts), found.message)))
                 uneven_part = Finding.of("part-not-homogeneous", text)
                 freed = self._with_freed(problem, data, found)
@@ -200,8 +200,7 @@ class PartMasses:
         if not any(f.code == "part-not-homogeneous" for f in findings):
             return first.with_findings(*findings)
         # Masses of parts that cannot be right say nothing of which is zero.
-        said = [f for f in findings if f.code != "part-zero-mass"]
-        return self._loosened(problem, data).with_findings(*said)
+        return self._loosened(problem, data).with_findings(*other_than(findings, "part-zero-mass"))
 
     def _with_freed(self, problem: Problem, data: Effective, found: Uneven) -> Estimate:
         """Return the Estimate with densities freed within parts."""
@@ -261,8 +260,7 @@ class PartMasses:
         if not self.shape_error.movable:
             return body, spread + error, spread @ data.left_by(error) if blurred else spread
         placed = (followed if self.shape_error.doubtful else recentred)(data, body, error)
-        covariance = placed.left_of(data, spread) + placed.error
-        return placed.body, covariance, placed.following(data, spread @ data.left_by(error))
+        return placed.known(data, spread, error)
 
     def _built(
         self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array,
@@ -275,20 +273,14 @@ class PartMasses:
         solution = Solution.unconstrained(self._loaded(data.linear_at(body.vector)))
         if self.tool is not None:
             solution = replace(solution, known=self.tool.parameters.vector)
+        names = named_materials(len(self.parts), masses.choices, self.materials)
         estimate = conclude(problem, solution, "part-masses", response=data.response(follows))
         found = replace(
             estimate,
             parameters=body,
             covariance=0.5 * (covariance + covariance.T),
             part_covariance=masses.covariance,
-            parts=self._found(masses),
+            parts=weighed(self.parts, masses.mean, masses.covariance, names),
             identified=np.ones(10, np.bool_),
         )
         return widened(found)
-
-    def _found(self, masses: Masses) -> tuple[PartMass, ...]:
-        """Return the parts with their masses and materials."""
-        parts, std = self.parts, np.sqrt(np.maximum(np.diag(masses.covariance), 0))
-        names = named_materials(len(parts), masses.choices, self.materials)
-        rows = zip(parts.label, masses.mean, std, parts.volume, parts.centroid, names, strict=True)
-        return tuple(PartMass(int(k), float(m), float(s), float(v), c, name) for k, m, s, v, c, name in rows)

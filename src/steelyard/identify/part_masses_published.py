@@ -14,8 +14,9 @@ from scipy.optimize import nnls
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.evidence import Evidence, PartMass
+from steelyard.evidence import Evidence
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.masses.models import weighed
 from steelyard.logs.log import Mask, MotionLog
 from steelyard.parts.parts import Parts
 
@@ -64,7 +65,6 @@ class PublishedPartMasses:
 
     def _estimate(self, log: MotionLog, A: Array, b: Array, masses: Array) -> Estimate:
         covariance = _covariance(A, log, masses > 0)
-        std = np.sqrt(np.diag(covariance))
         B = self.parts.per_mass
         values = np.linalg.svd(A / np.linalg.norm(A, axis=0), compute_uv=False)
         seen = values > RANK_TOLERANCE * values[0]
@@ -77,14 +77,13 @@ class PublishedPartMasses:
             residual_force_N=float(np.sqrt(np.mean(residual[:, 3:] ** 2))),
             residual_torque_Nm=float(np.sqrt(np.mean(residual[:, :3] ** 2))),
         )
-        rows = zip(self.parts.label, masses, std, self.parts.volume, self.parts.centroid, strict=True)
         return Estimate(
             self.parts.whole(masses),
             B @ covariance @ B.T,
             "part-masses-published",
             evidence,
             np.ones(10, np.bool_),
-            parts=tuple(PartMass(int(k), float(m), float(s), float(v), c) for k, m, s, v, c in rows),
+            parts=weighed(self.parts, masses, covariance),
             part_covariance=covariance,
         )
 

@@ -10,11 +10,13 @@ from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import counted
 from steelyard.identify.cost.linear import normal_equations, reweighted, solve_scaled
+from steelyard.identify.cost.newton import Rows
 from steelyard.identify.cost.noise_cost import information, residual_map_of, weights_at
 from steelyard.identify.noise_levels import DEAF, EVERYDAY
 from steelyard.inertia.regressor import design
 from steelyard.logs.log import Integers, Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
+from steelyard.logs.noise import mean_heard
 
 # Row counts below this cannot fix four numbers and a bias whatever they hold.
 FEWEST_ROWS = 2
@@ -70,8 +72,7 @@ class Problem:
 
     def rms(self, square: Array) -> tuple[float, float]:
         """Return the rms [N m] and [N] per axis that measures, from mean squares (6,) of the channels."""
-        both = np.where(self.heard, square, 0.0).reshape(2, 3).sum(1) / np.maximum(self.heard.reshape(2, 3).sum(1), 1)
-        torque, force = np.sqrt(np.maximum(both, 0.0))
+        torque, force = np.sqrt(np.maximum(mean_heard(square, self.heard), 0.0))
         return float(torque), float(force)
 
     @classmethod
@@ -129,6 +130,11 @@ class Problem:
         T[:count, :, :width], T[count:, :, width:] = self.T, design
         return replace(wider, scatter=scatter, T=T, blocks=blocks, block_class=block_class, block_number=groups[:, 2])
 
+    @property
+    def rows(self) -> Rows:
+        """The rows as the noise-aware cost takes them."""
+        return Rows(self.T, self.scatter, self.acceleration, self.wrench)
+
     def residual_map(self, linear: Array) -> Array:
         """Return K (6, Z), so that the wrench residual of a row is K z."""
         return np.asarray(residual_map_of(self.T, linear))
@@ -155,11 +161,11 @@ class Problem:
 
     def information(self, linear: Array) -> tuple[Array, Array, Array]:
         """Return `noise_cost.information` (p, p) of all rows at the linear parameters (p,)."""
-        return information(self.residual_map(linear), self.T, self.scatter, self.acceleration, self.wrench)
+        return information(self.residual_map(linear), *self.rows)
 
     def reweighted(self, passes: int) -> Array:
         """Return the linear parameters (p,) of so many weighted solutions, each with the weights of the last."""
-        return reweighted(self.T, self.scatter, self.acceleration, self.wrench, passes)
+        return reweighted(*self.rows, passes)
 
     def fixed_weight_score(self, linear: Array, weights: Array) -> Array:
         """Return the variance (p, p) of the score of rows weighted by `weights` (C, 6, 6) under white noise.

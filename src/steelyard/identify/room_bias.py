@@ -11,12 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import softmax
 
 from steelyard.check import Array
 from steelyard.identify.bars.correlated import score_in_time
 from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.linear import inverse_scaled, nonnegative
 from steelyard.identify.fit import Bias, prepared
+from steelyard.identify.mixture import mixture
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
@@ -76,10 +78,9 @@ def _told(log: MotionLog, problem: Problem, solution: Solution, taken: Array, we
     """
     own = len(solution.linear)
     wide = replace(solution, linear=np.concatenate([solution.linear, np.zeros(6)]))
-    data = problem.scatter, problem.acceleration, problem.wrench
     H, extra, plain = problem.information(wide.linear)
     H = problem.plus_bias_prior(nonnegative(H, plain))
-    _, gradient, _ = noise_cost.derivatives(problem.residual_map(wide.linear), problem.T, *data)
+    _, gradient, _ = noise_cost.derivatives(problem.residual_map(wide.linear), *problem.rows)
     variance = score_in_time(log, problem, wide).variance
     V = nonnegative(H + extra, plain) if variance is None else variance
     # How the body follows the bias: the search has set its own part of the gradient to zero.
@@ -99,8 +100,4 @@ def _drawn(F: Array, g: Array) -> RoomBias:
     covariance = S[:, :, None] * np.linalg.inv(A) * S[:, None, :]
     means = covariance @ g
     chance = (means @ g - np.linalg.slogdet(A)[1]) / 2
-    share = np.exp(chance - chance.max())
-    share /= share.sum()
-    mean = share @ means
-    off = means - mean
-    return RoomBias(mean, np.tensordot(share, covariance, 1) + (share[:, None] * off).T @ off)
+    return RoomBias(*mixture(softmax(chance), means, covariance))

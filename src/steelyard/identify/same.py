@@ -9,8 +9,8 @@ from scipy.special import gammaincc
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.identify.conclude import natural_sizes
 from steelyard.identify.cost.linear import unit_diagonal
+from steelyard.identify.sight import natural_sizes
 from steelyard.inertia import InertialParameters, forms
 from steelyard.inertia.people import NAMES, people_jacobian
 

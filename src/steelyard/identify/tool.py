@@ -9,10 +9,10 @@ from scipy.special import gammaincc
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.findings import Finding
-from steelyard.identify.conclude import identified, natural_sizes
+from steelyard.findings import Finding, other_than
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import BiasPrior
+from steelyard.identify.sight import identified, natural_sizes
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.people import ENTRIES
 from steelyard.logs.log import Mask
@@ -93,7 +93,7 @@ def of_tools_run(tool: Estimate) -> tuple[Finding, ...]:
 
     What it left open of the inertia is not said again (`without_tool` does), nor that the tool is included.
     """
-    told = (finding for finding in tool.findings if finding.code not in ("inertia-not-identified", "tool-included"))
+    told = other_than(tool.findings, "inertia-not-identified", "tool-included")
     return tuple(replace(finding, message=f"In the tool's run: {finding.message}") for finding in told)
 
 

@@ -10,12 +10,15 @@ import numpy as np
 
 from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
+from steelyard.logs.conditioning import noise_variances
 from steelyard.logs.recording import Stream
 
 # A channel is clipped when its extreme value comes up this often and at least five times as often as its neighbours.
 CLIPPED_ROWS, CLIPPED_SHARE, CLIPPED_RATIO = 10, 0.003, 5
 # Measured channels carry noise of more than this share of their range; simulated ones without noise do not.
 NOISE_SHARE = 1e-5
+# Rows from which on, and in blocks of which, noise is told.
+_FEWEST, _NOISE_BLOCK = 7, 50
 # What is left of a stream that loses more rows than this share is no fair sample: then none is left out.
 MOST_LEFT_OUT = 0.7
 LEFT_OUT, TOO_MANY = "these rows were left out", "so many cannot be left out, and these were used as they are"
@@ -66,8 +69,7 @@ def with_neighbours(rows: Mask) -> Mask:
 
 def noise_shares(values: Array) -> Array:
     """Return the noise of each column over its range (D,), from third differences, in the median stretch."""
-    squares = np.diff(values, 3, axis=0) ** 2 / 20
-    if len(squares) < 4:
+    if len(values) < _FEWEST:
         return np.zeros(values.shape[1])
-    blocks = np.array_split(squares, max(len(squares) // 50, 1))
-    return np.asarray(np.sqrt(np.median([b.mean(0) for b in blocks], 0)) / np.maximum(np.ptp(values, axis=0), 1e-300))
+    noise = np.sqrt(np.median(noise_variances(values, _NOISE_BLOCK), axis=0))
+    return np.asarray(noise / np.maximum(np.ptp(values, axis=0), 1e-300))

@@ -17,7 +17,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.delays import Question, features
-from steelyard.logs.noise import FAR, block_sums, huber, robust_std
+from steelyard.logs.noise import FAR, block_covariance, huber, robust_std
 from steelyard.logs.runs import stretches
 
 # A clock is called from so many standard deviations, where it leaves at most this share of the squared residual that
@@ -150,9 +150,7 @@ def _step(
     H = np.einsum("nck,ncl->kl", weighted, A) + np.diag(known)
     step = np.linalg.solve(H, np.einsum("nck,nc->k", weighted, r) - known * off)
     scores = np.einsum("nck,nc->nk", weighted, r - A @ step)
-    sums = block_sums(scores, _BLOCKS)
-    back = np.linalg.inv(H)
-    covariance = back @ (sums.T @ sums * _BLOCKS / (_BLOCKS - 1) + np.diag(known)) @ back
+    covariance = block_covariance(H, scores, known, _BLOCKS)
     return step.reshape(-1, 2), np.sqrt(np.diag(covariance)).reshape(-1, 2)
 
 

@@ -85,7 +85,15 @@ def noise_std(values: Array) -> Array:
     y = check.finite("values", values)
     if len(y) < 8:
         return np.zeros(y.shape[1])
-    squares = np.diff(y, 3, axis=0) ** 2 / 20
-    parts = np.array_split(squares, max(len(squares) // _NOISE_BLOCK, 1))
-    quiet = np.sqrt(np.quantile(np.stack([p.mean(0) for p in parts]), 0.1, axis=0))
-    return np.asarray(quiet / _QUIETEST if len(parts) > 9 else quiet)
+    variances = noise_variances(y, _NOISE_BLOCK)
+    quiet = np.sqrt(np.quantile(variances, 0.1, axis=0))
+    return np.asarray(quiet / _QUIETEST if len(variances) > 9 else quiet)
+
+
+def noise_variances(values: Array, rows: int) -> Array:
+    """Return the white-noise variance (B, D) in each block of about `rows` rows of `values` (N, D): third differences.
+
+    There must be four rows or more.
+    """
+    squares = np.diff(values, 3, axis=0) ** 2 / 20
+    return np.stack([part.mean(0) for part in np.array_split(squares, max(len(squares) // rows, 1))])

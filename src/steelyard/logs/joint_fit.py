@@ -14,7 +14,7 @@ from steelyard.logs.imu import Imu, Mounting, first_mount
 from steelyard.logs.kinematics import Motion
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import regressors
-from steelyard.logs.noise import block_sums, huber, robust_std
+from steelyard.logs.noise import block_covariance, huber, robust_std
 from steelyard.spatial import Rotation, lever_acceleration
 
 _BLOCKS = 20
@@ -287,9 +287,6 @@ def _weights(residual: Array, sigma: Array, power: int) -> Array:
 def _block_std(layout: _Layout, theta: Array, weights: Array) -> Array:
     """Return standard deviations (P,) by the sandwich over time blocks, which sees correlated residuals."""
     r, J = _jacobian(layout, theta)
-    prior = np.diag(1 / layout.width**2)
-    H, scores = _normal(J, weights, r, 1 / layout.width**2)
-    sums = block_sums(scores, _BLOCKS)
-    back = np.linalg.inv(H)
-    cov = back @ (sums.T @ sums) @ back * _BLOCKS / (_BLOCKS - 1) + back @ prior @ back
-    return np.sqrt(np.maximum(np.diag(cov), 0))
+    prior = 1 / layout.width**2
+    H, scores = _normal(J, weights, r, prior)
+    return np.sqrt(np.maximum(np.diag(block_covariance(H, scores, prior, _BLOCKS)), 0))

@@ -25,15 +25,26 @@ def robust_std(values: Array) -> Array:
     return np.asarray(1.4826 * np.median(np.abs(values), axis=0))
 
 
+def mean_heard(values: Array, heard: Mask) -> Array:
+    """Return the means (2,) of values (6,) over the three torques and the three forces, of channels that measure."""
+    return np.asarray((values * heard).reshape(2, 3).sum(1) / np.maximum(heard.reshape(2, 3).sum(1), 1))
+
+
 def huber(scaled: Array) -> Array:
     """Return how much (N,) each row of residuals (N, k) over their spread counts: less from an rms of FAR on."""
     return np.asarray(np.minimum(1.0, FAR / np.maximum(np.sqrt((scaled**2).mean(1)), 1e-12)))
 
 
-def block_sums(scores: Array, blocks: int) -> Array:
-    """Return the sums (blocks, P) of scores (N, P) over as many even stretches of rows."""
+def block_covariance(H: Array, scores: Array, prior: Array, blocks: int) -> Array:
+    """Return the covariance (P, P) of a fit by the scores (N, P) of its rows, summed over even stretches of them.
+
+    H  (P, P) normal matrix, in it the `prior` (P,), which counts as data of its own strength
+    This sandwich sees residuals that are correlated within a stretch.
+    """
     block = stretches(len(scores), blocks)
-    return np.stack([np.bincount(block, column, blocks) for column in scores.T], 1)
+    sums = np.stack([np.bincount(block, column, blocks) for column in scores.T], 1)
+    back = np.linalg.inv(H)
+    return np.asarray(back @ (sums.T @ sums * blocks / (blocks - 1) + np.diag(prior)) @ back)
 
 
 def rounding(wrench: Array) -> Array:

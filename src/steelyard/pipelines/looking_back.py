@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.findings import Finding, codes
+from steelyard.findings import Finding, codes, other_than
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.room_bias import without
 from steelyard.identify.scale import allow_scale
@@ -46,10 +46,10 @@ def looked_back(
     if load.shape is None:
         late = examine_wrench_unit(load.log, estimate, load.of, before, late)
     if untared := not_tared(load, estimate):
-        late = (*untared, *(f for f in late if f.code != "wrench-unexplained"))
+        late = (*untared, *other_than(late, "wrench-unexplained"))
     if any(f.left_in for f in before):
         # With a cause left in, rows only seem to lie in one plane.
-        late = tuple(f for f in late if f.code != "nearly-planar")
+        late = other_than(late, "nearly-planar")
     return load, estimate, late
 
 

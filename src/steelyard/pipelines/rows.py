@@ -8,13 +8,12 @@ well: then they are found anew without its time.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import Finding, codes
+from steelyard.findings import Finding, codes, other_than
 from steelyard.identify.fit import Bias
 from steelyard.identify.noise_levels import with_declared, without_dead
 from steelyard.logs.alignment import Aligned, align
@@ -97,24 +96,145 @@ class FitRows:
         return (*self.level, *self.unmeasured)
 
 
-def rows_to_fit(recording: Recording, before: tuple[Finding, ...], options: Options) -> FitRows:
-    """Return the rows that are fitted; `before` was found in the recording as it was read."""
-    how = AlignOptions()
-    rows = _rows(recording, before, options, how)
-    if rows.unmeasured:
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A recording, what was found in it as it was read, and what the caller chose."""
+
+    recording: Recording
+    before: tuple[Finding, ...]
+    options: Options
+
+    @property
+    def left_in(self) -> bool:
+        """Whether the cause of a finding was left in: then nothing fits one body."""
+        return any(f.left_in for f in self.before)
+
+    @property
+    def unlike_one_body(self) -> bool:
+        """Whether rows in motion carry another mass than rows at rest."""
+        return bool(codes(self.before) & UNLIKE_ONE_BODY)
+
+    def rows_to_fit(self) -> FitRows:
+        """Return the rows that are fitted."""
+        how, drift = AlignOptions(), self.options.drift
+        rows = self._rows(how)
+        if rows.unmeasured:
+            return rows
+        place, units = examine_place(rows.log, self.before, drift)
+        if units:
+            return replace(rows, units=units)
+        if place is not None:
+            place = replace(place, measured=rows.aligned.acceleration_from == MEASURED)
+        if place is not None and not place.seen:
+            rows = replace(rows, maybe=place)
+        elif place is not None:
+            rows, how = self._placed(place)
+        if rows.delayed and (turn := turn_of(rows.log, self.recording, self.before, drift)) is not None:
+            rows = replace(self._rows(replace(how, turn=turn)), place=rows.place, maybe=rows.maybe)
         return rows
-    place, units = examine_place(rows.log, before, options.drift)
-    if units:
-        return replace(rows, units=units)
-    if place is not None:
-        place = replace(place, measured=rows.aligned.acceleration_from == MEASURED)
-    if place is not None and not place.seen:
-        rows = replace(rows, maybe=place)
-    elif place is not None:
-        rows, how = _placed(place, recording, before, options)
-    if rows.delayed and (turn := turn_of(rows.log, recording, before, options.drift)) is not None:
-        rows = replace(_rows(recording, before, options, replace(how, turn=turn)), place=rows.place, maybe=rows.maybe)
-    return rows
+
+    def _placed(self, place: Misplaced) -> tuple[FitRows, AlignOptions]:
+        """Return the rows with accelerations of S, where they were of another point, and how they were aligned.
+
+        The point told is the one that the rows were made with: what they still show beside it widens its bars.
+        """
+        for left in reversed(range(ROUNDS)):
+            x, y, z = (float(v) for v in place.place)
+            how = AlignOptions(place=(x, y, z))
+            rows = self._rows(how)
+            rest = misplaced(rows.log, self.options.drift)
+            if rest is None or np.linalg.norm(rest.place) < SETTLED:
+                break
+            if not left:
+                place = replace(place, std=np.hypot(place.std, rest.place))
+                break
+            place = replace(place, place=place.place + rest.place, std=rest.std)
+        return replace(rows, place=place), how
+
+    def _rows(self, how: AlignOptions) -> FitRows:
+        """Return the rows to fit, aligned as said; where a hand touched the object, the rest alone tells the clocks.
+
+        A strong hand draws delays so far off that the wrong time, or none, seems free of it: what agrees with clocks as
+        stamped is tried, too, and the time counts in which one body explains most, and best.
+        """
+        rows = self._as_aligned(how)
+        left = force_left(rows.log)
+        poor = rows.left_out or left > POOR * np.ptp(rows.log.wrench[:, 3:])
+        misread = self.left_in or self.unlike_one_body
+        if rows.unmeasured or misread or not poor or not any(rows.aligned.delays_std_s.values()):
+            return rows
+        stamped, _ = self._aligned(replace(how, estimate_delays=False))
+        agree = _times_of(stamped.log, agreeing(stamped.log, self.options.bias == "free"))
+        enough = (WORSE if rows.left_out else CLEARER) * left
+        found: list[FitRows] = []
+        hands = {rows.left_out, agree} - {()}
+        for _ in range(HANDS):
+            for hand in sorted(hands):
+                try:
+                    again = self._as_aligned(replace(how, touched=hand))
+                except CannotAnswer:
+                    continue  # too little is left for clocks: what all rows say stands
+                if again.left_out and again.kept > LEAST_KEPT and force_left(again.log) < enough:
+                    found.append(again)
+            hands = {min(found, key=_cost).left_out} - hands if found else set()
+        return min(found, key=_cost, default=rows)
+
+    def _as_aligned(self, how: AlignOptions) -> FitRows:
+        """Return the rows to fit, aligned as said, and without a bias that keeps its direction in the room."""
+        aligned, level = self._aligned(how)
+        log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes(self.before))
+        rows = self._held(FitRows(log, aligned, level, unmeasured, ()))
+        room, rotation = self._room_bias(rows, log), rotation_of(log, aligned)
+        if room is None or rotation is None:
+            return rows
+        # Such a bias looks like a hand in some poses: whether there is one shows without it.
+        whole = FitRows(room.put_right(log, rotation), aligned, level, unmeasured, ())
+        return replace(self._held(whole), room=room)
+
+    def _room_bias(self, rows: FitRows, log: MotionLog) -> SeenRoomBias | None:
+        """Return the bias that keeps its direction in the room in the rows kept, or in all of `log`; else None."""
+        if self.options.gravity != "given" or stands_aside("room bias", self.before) or self.left_in:
+            return None
+        bias, recording = Bias(self.options.bias, drift=self.options.drift), self.recording
+        # Noise that aligning judged with the bias in is not kept.
+        everything = without_dead(with_declared(log, recording.noise))
+        for some in (rows.log, everything)[: 1 + bool(rows.touched)]:
+            rotation = rotation_of(some, rows.aligned)
+            found = examine_room_bias(some, rotation, recording.gravity, recording.wrench_sign, bias)
+            if found is not None:
+                return found
+        return None
+
+    def _held(self, rows: FitRows) -> FitRows:
+        """Return the rows in which the robot alone held one body, and findings about the others."""
+        log, recording, options = rows.log, self.recording, self.options
+        keep: slice | Mask = slice(None)
+        touched: tuple[Finding, ...] = ()
+        # Where a cause is left in, rows that are left out as touched would be chance.
+        whole = not rows.unmeasured and not self.left_in
+        if whole:
+            keep, touched = one_body(since_start(log, recording), recording, options.bias == "free", options.drift)
+        if self.unlike_one_body:
+            touched = ()  # moving rows carry another mass, and only look touched
+        left_out = _times_of(log, keep)
+        log = without_dead(with_declared(log.rows(keep), recording.noise))
+        if whole and not touched:
+            since = since_start(log, recording)
+            slip = small_slip(since, rotation_of(log, rows.aligned), recording.gravity)
+            if slip is not None:
+                keep, finding = slip.longer_side(since)
+                log, touched = log.rows(keep), (finding,)
+        return replace(rows, log=log, touched=touched, left_out=left_out)
+
+    def _aligned(self, how: AlignOptions) -> tuple[Aligned, tuple[str, ...]]:
+        """Return the recording aligned, with accelerations of S, and a note on the direction of gravity that was found.
+
+        Aligning takes the accelerations of poses to S; those of an accelerometer or a table come as they are.
+        """
+        aligned = align(self.recording, how)
+        if any(how.place) and (aligned.acceleration_from == MEASURED or aligned.log.time is None):
+            aligned = replace(aligned, log=of_sensor(aligned.log, np.array(how.place)))
+        return (aligned, ()) if self.options.gravity == "given" else _levelled(aligned, self.recording.gravity)
 
 
 def rows_as_given(
@@ -124,121 +244,18 @@ def rows_as_given(
 
     gravity  (3,) [m/s^2] in W as given, before the recording was examined
     """
-    rows = rows_to_fit(recording, before, options)
+    rows = Reading(recording, before, options).rows_to_fit()
     if "base-tilted" not in codes(before):
         return recording, before, rows
     level = replace(recording, gravity=gravity)
-    others = tuple(f for f in before if f.code != "base-tilted")
-    again = rows_to_fit(level, others, options)
+    others = other_than(before, "base-tilted")
+    again = Reading(level, others, options).rows_to_fit()
     return (recording, before, rows) if again.room is None else (level, others, again)
-
-
-def _placed(
-    place: Misplaced, recording: Recording, before: tuple[Finding, ...], options: Options
-) -> tuple[FitRows, AlignOptions]:
-    """Return the rows with accelerations of S, where they were of another point, and how they were aligned.
-
-    The point told is the one that the rows were made with: what they still show beside it widens its bars.
-    """
-    for left in reversed(range(ROUNDS)):
-        x, y, z = (float(v) for v in place.place)
-        how = AlignOptions(place=(x, y, z))
-        rows = _rows(recording, before, options, how)
-        rest = misplaced(rows.log, options.drift)
-        if rest is None or np.linalg.norm(rest.place) < SETTLED:
-            break
-        if not left:
-            place = replace(place, std=np.hypot(place.std, rest.place))
-            break
-        place = replace(place, place=place.place + rest.place, std=rest.std)
-    return replace(rows, place=place), how
-
-
-def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
-    """Return the rows to fit, aligned as said; where a hand touched the object, the rest alone tells the clocks.
-
-    A strong hand draws delays so far off that the wrong time, or none, seems free of it: what agrees with clocks as
-    stamped is tried, too, and the time counts in which one body explains most, and best.
-    """
-    rows = _as_aligned(recording, before, options, how)
-    left = force_left(rows.log)
-    poor = rows.left_out or left > POOR * np.ptp(rows.log.wrench[:, 3:])
-    misread = any(f.left_in for f in before) or codes(before) & UNLIKE_ONE_BODY
-    if rows.unmeasured or misread or not poor or not any(rows.aligned.delays_std_s.values()):
-        return rows
-    stamped, _ = levelled_as(options.gravity, _aligned(recording, replace(how, estimate_delays=False)), recording)
-    agree = _times_of(stamped.log, agreeing(stamped.log, options.bias == "free"))
-    enough = (WORSE if rows.left_out else CLEARER) * left
-    found: list[FitRows] = []
-    hands = {rows.left_out, agree} - {()}
-    for _ in range(HANDS):
-        for hand in sorted(hands):
-            try:
-                again = _as_aligned(recording, before, options, replace(how, touched=hand))
-            except CannotAnswer:
-                continue  # too little is left for clocks: what all rows say stands
-            if again.left_out and again.kept > LEAST_KEPT and force_left(again.log) < enough:
-                found.append(again)
-        hands = {min(found, key=_cost).left_out} - hands if found else set()
-    return min(found, key=_cost, default=rows)
 
 
 def _cost(rows: FitRows) -> float:
     """Return the log of what one body leaves, and a fine on the time left out."""
     return float(np.log(max(force_left(rows.log), 1e-12))) - FINE * rows.kept
-
-
-def _as_aligned(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
-    """Return the rows to fit, aligned as said, and without a bias that keeps its direction in the room."""
-    aligned, level = levelled_as(options.gravity, _aligned(recording, how), recording)
-    log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes(before))
-    rows = _held(FitRows(log, aligned, level, unmeasured, ()), recording, before, options)
-    room = _room_bias(rows, log, recording, before, options)
-    rotation = rotation_of(log, aligned)
-    if room is None or rotation is None:
-        return rows
-    # Such a bias looks like a hand in some poses: whether there is one shows without it.
-    whole = FitRows(room.put_right(log, rotation), aligned, level, unmeasured, ())
-    return replace(_held(whole, recording, before, options), room=room)
-
-
-def _room_bias(
-    rows: FitRows, log: MotionLog, recording: Recording, before: tuple[Finding, ...], options: Options
-) -> SeenRoomBias | None:
-    """Return the bias that keeps its direction in the room in the rows that are kept, or in all of `log`; else None."""
-    if options.gravity != "given" or stands_aside("room bias", before) or any(f.left_in for f in before):
-        return None
-    bias = Bias(options.bias, drift=options.drift)
-    # Noise that aligning judged with the bias in is not kept.
-    everything = without_dead(with_declared(log, recording.noise))
-    for some in (rows.log, everything)[: 1 + bool(rows.touched)]:
-        rotation = rotation_of(some, rows.aligned)
-        found = examine_room_bias(some, rotation, recording.gravity, recording.wrench_sign, bias)
-        if found is not None:
-            return found
-    return None
-
-
-def _held(rows: FitRows, recording: Recording, before: tuple[Finding, ...], options: Options) -> FitRows:
-    """Return the rows in which the robot alone held one body, and findings about the others."""
-    log = rows.log
-    keep: slice | Mask = slice(None)
-    touched: tuple[Finding, ...] = ()
-    # Where a cause is left in, nothing fits one body: rows that are left out as touched would be chance.
-    whole = not rows.unmeasured and not any(f.left_in for f in before)
-    if whole:
-        keep, touched = one_body(since_start(log, recording), recording, options.bias == "free", options.drift)
-    if codes(before) & UNLIKE_ONE_BODY:
-        touched = ()  # moving rows carry another mass, and only look touched
-    left_out = _times_of(log, keep)
-    log = without_dead(with_declared(log.rows(keep), recording.noise))
-    if whole and not touched:
-        since = since_start(log, recording)
-        slip = small_slip(since, rotation_of(log, rows.aligned), recording.gravity)
-        if slip is not None:
-            keep, finding = slip.longer_side(since)
-            log, touched = log.rows(keep), (finding,)
-    return replace(rows, log=log, touched=touched, left_out=left_out)
 
 
 def _times_of(log: MotionLog, keep: slice | Mask) -> Spans:
@@ -255,27 +272,12 @@ def since_start(log: MotionLog, recording: Recording) -> MotionLog:
     return log if log.time is None else replace(log, time=log.time - start)
 
 
-def _aligned(recording: Recording, how: AlignOptions) -> Aligned:
-    """Return the recording aligned, with accelerations of S.
-
-    Aligning takes those of poses there; those that an accelerometer or a table gives come as they are.
-    """
-    aligned = align(recording, how)
-    if not any(how.place) or not (aligned.acceleration_from == MEASURED or aligned.log.time is None):
-        return aligned
-    return replace(aligned, log=of_sensor(aligned.log, np.array(how.place)))
-
-
-def levelled_as(
-    gravity: Literal["given", "unknown"], aligned: Aligned, recording: Recording
-) -> tuple[Aligned, tuple[str, ...]]:
-    """Return the log for the direction of gravity that it shows itself, and a note, where that was asked for."""
-    if gravity == "given":
-        return aligned, ()
+def _levelled(aligned: Aligned, gravity: Array) -> tuple[Aligned, tuple[str, ...]]:
+    """Return the log for the direction of gravity that it shows itself, and a note; `gravity` (3,) as it was given."""
     if aligned.rotation is None:
         raise BadValue('gravity "unknown" needs the rotation of the sensor; the log has none. Add a rotation stream.')
     rotation = aligned.rotation.matrix
-    found = fitted_gravity(aligned.log, rotation, recording.gravity, aligned.acceleration_from)
+    found = fitted_gravity(aligned.log, rotation, gravity, aligned.acceleration_from)
     if found is None:
         raise CannotAnswer("The log does not show the direction of gravity: turn the sensor about two different axes.")
     log = levelled(aligned.log, rotation, found.gravity, aligned.acceleration_from)

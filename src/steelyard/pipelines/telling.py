@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.findings import AT_REST, BARE, REMEDIES, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
+from steelyard.findings import AT_REST, BARE, REMEDIES, UNEXPLAINED, UNMEASURED, WEIGHED, Finding, other_than
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import ADD_POSES
 from steelyard.logs.recording import Recording
@@ -96,15 +96,15 @@ def told(estimate: Estimate, noticed: Noticed, rows: FitRows, load: Load, parts:
     """Return the estimate with all findings: what is wrong with the log stands before what follows from it."""
     before, late, of_sensor = noticed.before, noticed.late, noticed.of_sensor
     if any(finding.code == "sensor-turned" for finding in of_sensor):
-        before = tuple(f for f in before if f.code != "sensor-turned")  # the fit tells it better
+        before = other_than(before, "sensor-turned")  # the fit tells it better
     if not (parts is None or isinstance(parts, Parts)):
         before = (*before, *(finding.instead(WEIGHED if load.shape else {}) for finding in parts.findings))
         estimate = estimate.noted(*parts.notes)
     # In a wrong unit that was left in, rows only seem touched.
     touched = () if any(f.code in OF_UNITS for f in late) else rows.touched
     found = (*before, *late, *of_sensor, *estimate.findings, *rows.aligned.findings, *touched)
-    shared = load.bias.free and _suffers(estimate)
-    found = tuple(f for f in found if shared or f.code not in OF_BIAS)
+    if not (load.bias.free and _suffers(estimate)):
+        found = other_than(found, *OF_BIAS)
     return replace(estimate, findings=()).with_findings(*found)
 
 

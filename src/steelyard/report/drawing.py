@@ -122,13 +122,9 @@ def _marks(estimate: Estimate, scene: Scene, frame: Frame) -> dict[str, Any]:
     if scene.X_SO is None or not estimate.mass > 0:
         return {}
     com = estimate.com
-    values, axes = np.linalg.eigh(estimate.people_covariance[1:4, 1:4])
-    half = np.sqrt(_CHI2_95 * np.maximum(values, 0))
-    larger = _magnified(float(half.max()), frame.size)
-    marks: dict[str, Any] = {
-        "com": _plain(com),
-        "spread": {"axes": _plain((axes * half * larger).T), "larger": larger},
-    }
+    spread = _ellipsoid(estimate.people_covariance[1:4, 1:4])
+    larger = _magnified(float(np.linalg.norm(spread, axis=1).max()), frame.size)
+    marks: dict[str, Any] = {"com": _plain(com), "spread": {"axes": _plain(spread * larger), "larger": larger}}
     if isinstance(estimate, TeamEstimate):
         marks |= {"grasps": _grasps(estimate, frame), "open": True}
     else:
@@ -142,16 +138,19 @@ def _marks(estimate: Estimate, scene: Scene, frame: Frame) -> dict[str, Any]:
 
 def _grasps(estimate: TeamEstimate, frame: Frame) -> dict[str, Any]:
     """Return axes and 95 % ellipsoid of every grasp, all magnified alike."""
-    spreads = []
-    for grasp in estimate.grasps.values():
-        values, axes = np.linalg.eigh(grasp.covariance[3:, 3:])
-        spreads.append((axes * np.sqrt(_CHI2_95 * np.maximum(values, 0))).T)
+    spreads = np.stack([_ellipsoid(grasp.covariance[3:, 3:]) for grasp in estimate.grasps.values()])
     larger = _magnified(float(np.linalg.norm(spreads, axis=-1).max()), 2 * frame.size)  # to stand out of the grippers
     rows = [
         {"at": _plain(grasp.pose.position), "axes": _plain(grasp.pose.rotation.matrix.T), "spread": _plain(s * larger)}
         for grasp, s in zip(estimate.grasps.values(), spreads, strict=True)
     ]
     return {"rows": rows, "larger": larger}
+
+
+def _ellipsoid(covariance: Array) -> Array:
+    """Return the half axes (3, 3), one per row, of the ellipsoid that holds 95 % of errors with covariance (3, 3)."""
+    values, axes = np.linalg.eigh(covariance)
+    return np.asarray((axes * np.sqrt(_CHI2_95 * np.maximum(values, 0))).T)
 
 
 def _magnified(half: float, size: float) -> int:

@@ -11,7 +11,7 @@ from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
 from steelyard.report.numbers import measured
 from steelyard.report.palette import hexadecimal, scale_stops
-from steelyard.report.plots import share_bar
+from steelyard.report.plots import share_bar, swatch
 from steelyard.report.projection import picture
 from steelyard.report.scene import Scene
 from steelyard.tables.numbers import fixed, general, mass_unit, places_of
@@ -125,7 +125,7 @@ def _part(report: Report, part: PartMass, colour: tuple[int, int, int], share: f
         said.append(f" · truth {fixed(factor * true, places_of(factor * part.mass, factor * part.std))} {unit}")
     return tag(
         "li",
-        tag("label", _switch(part.label, name, drawn), _swatch(colour), tag("span", name, class_="name"),
+        tag("label", _switch(part.label, name, drawn), swatch(hexadecimal(colour)), tag("span", name, class_="name"),
             tag("span", measured(factor * part.mass, factor * part.std, unit), class_="mass")),
         share_bar(share, hexadecimal(colour)),
         tag("p", *said, class_="aside"),
@@ -137,7 +137,7 @@ def _bare(report: Report, label: int, colour: tuple[int, int, int]) -> Html:
     """Return the row of a part whose mass nobody has found."""
     name = report.name_of(label)
     return tag(
-        "li", tag("label", _switch(label, name, True), _swatch(colour), tag("span", name, class_="name")),
+        "li", tag("label", _switch(label, name, True), swatch(hexadecimal(colour)), tag("span", name, class_="name")),
         tag("p", report.says[label], class_="aside") if label in report.says else "",
         data_label=label,
     )  # fmt: skip
@@ -147,13 +147,6 @@ def _switch(label: int, name: str, drawn: bool) -> Html:
     if not drawn:
         return joined()
     return tag("input", type="checkbox", checked=True, hidden=True, data_part=label, aria_label=f"Show {name}")
-
-
-def _swatch(colour: tuple[int, int, int]) -> Html:
-    return tag(
-        "svg", tag("rect", width=12, height=12, rx=3, fill=hexadecimal(colour)), width=12, height=12, class_="swatch",
-        aria_hidden="true",
-    )  # fmt: skip
 
 
 def _density_note(parts: list[PartMass]) -> Html:

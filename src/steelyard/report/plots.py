@@ -159,6 +159,12 @@ def interval_signs() -> list[Html]:
     ]
 
 
+def swatch(colour: str) -> Html:
+    """Return a square of a colour, beside the name of what is drawn in it."""
+    square = tag("rect", width=12, height=12, rx=3, fill=colour)
+    return tag("svg", square, width=12, height=12, class_="swatch", aria_hidden="true")
+
+
 def share_bar(share: float, colour: str) -> Html:
     """Return a thin bar of a colour that fills `share` (0..1) of its cell."""
     width = f"{100 * min(max(share, 0.0), 1.0):.1f}%"

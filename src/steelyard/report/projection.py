@@ -10,7 +10,7 @@ from steelyard.report.markup import Html, joined, tag
 from steelyard.report.palette import hexadecimal
 from steelyard.report.scene import Scene
 from steelyard.report.surfaces import thinned
-from steelyard.spatial import area_vectors, unit_vectors
+from steelyard.spatial import Rotation, area_vectors, unit_vectors
 
 MOST_TRIANGLES = 1600
 _WIDTH, _HEIGHT, _MARGIN = 960.0, 540.0, 40.0
@@ -19,11 +19,7 @@ _LIGHT = np.array([-0.45, 0.7, 0.55]) / np.linalg.norm([-0.45, 0.7, 0.55])
 
 def turned_view(frame: Frame) -> Array:
     """Return the rows right, up, toward (3, 3) of the first look: a little from the right and from above."""
-    yaw, pitch = np.deg2rad(-28.0), np.deg2rad(22.0)
-    c, s = np.cos(yaw), np.sin(yaw)
-    about_up = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    c, s = np.cos(pitch), np.sin(pitch)
-    about_right = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    about_up, about_right = Rotation.exp(np.deg2rad([[0.0, -28.0, 0.0], [22.0, 0.0, 0.0]])).matrix
     return np.asarray(about_right @ about_up @ frame.view)
 
 

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from steelyard import check
 from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
-from steelyard.report.surfaces import compact, evened, part_skins, thinned
+from steelyard.report.surfaces import evened, part_skins, thinned
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.mesh import TriangleMesh
@@ -104,7 +104,7 @@ def _bodies(skins: Sequence[tuple[int, Array, Integers]], cloud: Cloud | None, r
     for number, (label, vertices, triangles) in enumerate(skins):
         if number not in kept:
             continue
-        v, t = thinned(*compact(vertices, triangles), max(int(share * len(triangles)), 12))
+        v, t = thinned(vertices, triangles, max(int(share * len(triangles)), 12))
         if not len(t):
             continue
         colour = _GREY if rgb is None else np.clip(np.rint(rgb[number]), 0, 255).astype(np.uint8)

@@ -6,6 +6,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
+from steelyard.inertia.people import ENTRIES
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
@@ -15,7 +16,7 @@ from steelyard.report.plots import interval, interval_signs, residual_plot
 from steelyard.tables.numbers import fixed, general, inertia_unit, mass_unit, places_of, principal
 from steelyard.team.estimate import TeamEstimate
 
-_ENTRIES = ("mass", "x", "y", "z", "xx", "xy", "xz", "yy", "yz", "zz")
+_NUMBERS = ("mass", *"xyz", *ENTRIES)
 _MOST = 60  # findings, notes: what a person may still read
 
 
@@ -100,7 +101,7 @@ def _open_card(seen: Estimate) -> Html:
     """Return that the data do not fix the principal moments, and which entries of the inertia they do fix."""
     known = [bool(fixed) and seen.mass > 0 for fixed in seen.identified[4:]]
     told, missing = (
-        ", ".join(f"I{entry}" for entry, fixed in zip(_ENTRIES[4:], known, strict=True) if fixed is which)
+        ", ".join(f"I{entry}" for entry, fixed in zip(ENTRIES, known, strict=True) if fixed is which)
         for which in (True, False)
     )
     state, said = "not fixed", "These data do not determine the inertia; see the findings."
@@ -219,7 +220,7 @@ def numbers(report: Report) -> Html:
     values, std = seen.parameters.people, seen.std
     true = None if report.truth is None else report.truth.body.people
     lines = []
-    for k, name in enumerate(_ENTRIES):
+    for k, name in enumerate(_NUMBERS):
         factor, unit = mass_unit(seen.mass) if k == 0 else (1e3, "mm") if k < 4 else inertia_unit(_largest(values))
         group = ("", "centre of mass ", "inertia ")[(k > 0) + (k > 3)]
         known = bool(seen.identified[k])

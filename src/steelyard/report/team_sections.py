@@ -9,6 +9,7 @@ from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
 from steelyard.report.numbers import measured
 from steelyard.report.palette import hexadecimal
+from steelyard.report.plots import swatch
 from steelyard.report.sections import section, table
 from steelyard.spatial import Pose
 from steelyard.tables.numbers import decimals, fixed, general, rpy_deg
@@ -64,9 +65,7 @@ def _shown(value: float, std: float, unit: str) -> Html | str:
 def _line(report: Report, seen: TeamEstimate, name: str, true: Pose | None, compared: bool, late: bool) -> Html:
     grasp, own = seen.grasps[name], name == seen.reference
     colour = colours_of(report).get(1 + list(seen.grasps).index(name), (150, 150, 150))
-    swatch = tag("svg", tag("rect", width=12, height=12, rx=3, fill=hexadecimal(colour)), width=12, height=12,
-                 aria_hidden="true")  # fmt: skip
-    cells = [tag("th", swatch, " ", name, scope="row")]
+    cells = [tag("th", swatch(hexadecimal(colour)), " ", name, scope="row")]
     if own:
         cells.append(tag("td", "the reference", colspan=4, class_="aside"))
     else:

@@ -8,11 +8,12 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.inertia.people import NAMES
 from steelyard.tables.marks import PLAIN, Marks
 from steelyard.tables.numbers import LARGE_INERTIA, places_of, plain, plus_minus, spread
 from steelyard.tables.shown import Weighed
 
-INERTIA = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+INERTIA = NAMES[4:]
 
 
 def estimate_table(
@@ -43,14 +44,13 @@ def estimate_table(
 def _body_rows(estimate: Weighed, truth: Array | None) -> list[tuple[str, str, str]]:
     """Return the rows name, value ± std, and truth."""
     values = estimate.parameters.people
-    names = ["mass", "com x", "com y", "com z", *INERTIA]
     told = np.abs(values[4:])[np.asarray(estimate.identified[4:])]
     large = bool(told.max(initial=0.0) >= LARGE_INERTIA)
     scales = np.repeat([1.0, 1e3, 1.0 if large else 1e6], [1, 3, 6])
     units = ["kg"] + ["mm"] * 3 + ["kg m²" if large else "kg mm²"] * 6
     jackknife = estimate.evidence.jackknife_people
     rows = []
-    for k, name in enumerate(names):
+    for k, name in enumerate(NAMES):
         if k >= 4 and not estimate.identified[k]:
             continue
         value, std, beside = float(values[k] * scales[k]), float(estimate.std[k] * scales[k]), ""

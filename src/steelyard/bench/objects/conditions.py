@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from steelyard.bench.middles import middle_of
 from steelyard.logs.log import MotionLog
 from steelyard.simulate.conditions import condition, condition_as_published
 
@@ -24,11 +25,8 @@ def condition_means(objects: Sequence[dict[str, dict[str, float | None]]]) -> di
     """Return <noise>.<properly|as_published|printed>: means over the objects that have one, and the paper's figure."""
     out: dict[str, dict[str, float | None]] = {}
     for noise in objects[0] if objects else ():
-        row: dict[str, float | None] = {}
-        for name in ("properly", "as_published"):
-            values = [value for each in objects if (value := each[noise][name]) is not None]
-            row[name] = float(np.mean(values)) if values else None
-        out[noise] = row | {"printed": PRINTED.get(noise)}
+        means = {name: middle_of([each[noise][name] for each in objects]) for name in ("properly", "as_published")}
+        out[noise] = means | {"printed": PRINTED.get(noise)}
     return out
 
 

@@ -7,21 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from steelyard.bench.shapes.paper_parts import paper_parts, scores_of
 from steelyard.check import Array, Integers
 from steelyard.datasets.known_object import KnownObject
-from steelyard.evaluate.segments import hausdorff_mm, score_segments
+from steelyard.evaluate.segments import hausdorff_mm
 from steelyard.identify.masses.shape_error import ShapeError
-from steelyard.parts.clustering import cluster
 from steelyard.parts.parts import Parts
-from steelyard.parts.segment import nearest_cell
-from steelyard.parts.supervoxels import pieces_of_points, supervoxels
 from steelyard.pipelines.shape_in_parts import shape_of
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.published_surface import published_surface
 from steelyard.shape.tets import TetMesh
 
-# The paper cuts its tree at this depth: four parts.
-DEPTH = 2
 SCORES = ("impurity", "gce", "hausdorff_mm")
 
 
@@ -49,8 +45,7 @@ def segmented(known: KnownObject) -> Segmented:
     cloud = Cloud(known.cloud.xyz, known.cloud.rgb)
     shape = shape_of(cloud)
     thick = published_surface(cloud)
-    tree = cluster(thick, pieces_of_points(thick, cloud, supervoxels(cloud)))
-    labels = tree.cut_at(tree.nodes_at_depth(DEPTH))
+    labels = paper_parts(thick, cloud)
     paper = Parts(np.arange(labels.max() + 1), thick.moments(labels, int(labels.max()) + 1))
     made, cuts = shape.segmentation, shape.cuts()
     return Segmented(
@@ -68,7 +63,7 @@ def segmented(known: KnownObject) -> Segmented:
 
 def _scores(known: KnownObject, mesh: TetMesh, labels: Integers) -> dict[str, Any]:
     """Return the scores of parts of a solid against the labelled cloud."""
-    scores = score_segments(known.cloud.labels, labels[nearest_cell(known.cloud.xyz, mesh.centroids)])
+    scores = scores_of(known, mesh, labels)
     true = float(known.parts.volume.sum())
     return {
         "volume_ratio": mesh.volume / true,

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from steelyard.bench.middles import middle_of
+
 HALVES = ("all", "mixed", "uniform")
 SCORES = ("mass_pct", "com_pct", "com_mm", "inertia_pct", "riemannian", "com_pct_floored")
 Row = dict[str, Any]
@@ -57,10 +59,7 @@ def summary(
 
 def _of_group(rows: list[Row], middle: Callable[[Any], Any]) -> Row:
     """Return the mean or median of every score that there is, and counts."""
-    out: Row = {}
-    for key in (*SCORES, "solve_ms"):
-        values = [row[key] for row in rows if row[key] is not None]
-        out[key] = float(middle(values)) if values else None
+    out: Row = {key: middle_of([row[key] for row in rows], middle) for key in (*SCORES, "solve_ms")}
     out["consistent_pct"] = 100 * sum(row["consistent"] for row in rows) / len(rows) if rows else None
     out["zeroed"] = sum(row.get("zeroed") or 0 for row in rows)
     return out | {"failures": sum("failure" in row for row in rows), "runs": len(rows)}

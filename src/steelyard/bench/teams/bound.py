@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from scipy.fft import dct
 
-from steelyard.bench.asked import Progress
 from steelyard.bench.teams.intervals import errors
 from steelyard.check import Array
 from steelyard.inertia.parameters import frame_change
@@ -77,18 +76,16 @@ def _payload(noise: TeamNoise, exact: TeamTrial, standing: PoseTeam) -> Array:
     return np.sqrt(np.diag(jacobian @ np.linalg.inv(F) @ jacobian.T))
 
 
-def run(trials: int = 24, progress: Progress | None = None) -> dict[str, Any]:
+def run(trials: int) -> dict[str, Any]:
     """Return rms error over rms bound by kind, over trials with white noise and no bias."""
     kinds = ("rotation", "position", "mass", "com", "inertia")
     squares = {kind: np.zeros(2) for kind in kinds}
-    for k in range(trials):
-        made = simulate_team(SCENE, FIRST_SEED + k)
-        exact = simulate_team(replace(SCENE, noise=EXACT), FIRST_SEED + k)
+    for seed in range(FIRST_SEED, FIRST_SEED + trials):
+        made = simulate_team(SCENE, seed)
+        exact = simulate_team(replace(SCENE, noise=EXACT), seed)
         found, least = errors(made, JointTeam(clocks=False).identify(made.log)), bound(WHITE, exact)
         for kind in kinds:
             squares[kind] += [float((found[kind][0] ** 2).sum()), float((least[kind] ** 2).sum())]
-        if progress is not None:
-            progress(k + 1, trials)
     return {
         "trials": trials,
         **{

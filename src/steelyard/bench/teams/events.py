@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from steelyard.bench.pool import spread
+from steelyard.bench.teams.errors import score
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Presence, Slip, TeamNoise, TeamScene, case
-from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
 LATE_CASE, LATE_S = "B", 0.013
@@ -35,12 +35,6 @@ RULES = (
 )
 
 
-def _position(made: TeamTrial, found: TeamEstimate) -> float:
-    """Return the mean error [mm] of the grasps that are not the reference's."""
-    apart = np.linalg.norm(found.poses_of(made.log.names).position - made.truth.grasps.position, axis=1)
-    return float(1000 * apart[1:].mean())
-
-
 def late_trial(seed: int) -> Array:
     """Return position errors [mm] in step, late with the clocks found, late without, and the offset's error [s]."""
     together = simulate_team(case(LATE_CASE), seed)
@@ -48,9 +42,9 @@ def late_trial(seed: int) -> Array:
     found = JointTeam().identify(late.log)
     return np.array(
         [
-            _position(together, JointTeam().identify(together.log)),
-            _position(late, found),
-            _position(late, JointTeam(clocks=False).identify(late.log)),
+            score(together, JointTeam().identify(together.log))["position_mm"],
+            score(late, found)["position_mm"],
+            score(late, JointTeam(clocks=False).identify(late.log))["position_mm"],
             found.clock_offsets_s["robot1"] - LATE_S,
         ]
     )
@@ -92,15 +86,8 @@ def leaving_trial(job: tuple[str, int]) -> tuple[bool, Array]:
     for k, log in enumerate((made.log, told(made))):
         found = JointTeam().identify(log)
         named = named or (k == 0 and "robot-left" in found.codes())
-        body, moments = made.truth.body, found.principal_moments
-        rows.append(
-            [
-                _position(made, found),
-                100 * (found.mass / float(body.mass) - 1),
-                1000 * float(np.linalg.norm(found.com - body.com)),
-                np.nan if moments is None else 100 * float(np.abs(moments / made.truth.moments - 1).mean()),
-            ]
-        )
+        errors = score(made, found)
+        rows.append([np.nan if errors[kind] is None else np.mean(errors[kind]) for kind in LEFT_KINDS])
     return named, np.square(np.array(rows))
 
 

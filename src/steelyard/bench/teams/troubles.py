@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from steelyard.bench.pool import spread
+from steelyard.bench.teams.errors import score
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
-from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import Slip, TeamNoise, TeamScene, case
 from steelyard.team.joint import JointTeam
 
@@ -92,18 +93,9 @@ def trial(job: tuple[str, int]) -> tuple[bool, bool, Array]:
         made = simulate_team(trouble.scene(trouble.sound) if spoil else trouble.sound, seed)
         found = JointTeam().identify(trouble.log(made.log) if spoil else made.log)
         codes.append(trouble.code in found.codes())
-        rows.append(_errors(made, found.mass, found.com, [found.grasps[n].pose.position for n in made.log.names]))
+        errors = score(made, found)
+        rows.append([errors[kind] for kind in KINDS])
     return codes[0], codes[1], np.array(rows)
-
-
-def _errors(made: TeamTrial, mass: float, com: Array, places: list[Array]) -> list[float]:
-    apart = np.linalg.norm(np.array(places) - made.truth.grasps.position, axis=1)
-    body = made.truth.body
-    return [
-        1000 * float(apart[1:].mean()),
-        100 * abs(mass / float(body.mass) - 1),
-        1000 * float(np.linalg.norm(com - body.com)),
-    ]
 
 
 def run(trials: int, workers: int) -> dict[str, Any]:

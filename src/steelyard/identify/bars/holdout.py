@@ -13,7 +13,9 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.cost import noise_cost
+from steelyard.identify.cost.left_out import jackknife
 from steelyard.identify.cost.linear import inverse_scaled, normal_equations
+from steelyard.identify.cost.newton import Rows
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import forms
@@ -51,8 +53,8 @@ def leave_one_out(problem: Problem, solution: Solution, H: Array, response: Arra
         "holdout_force_N": force,
         "holdout_torque_Nm": torque,
         "blocks": len(numbers),
-        "jackknife": _jackknife(phi),
-        "jackknife_people": _jackknife(forms.people(phi)),
+        "jackknife": _spread(phi),
+        "jackknife_people": _spread(forms.people(phi)),
     }
 
 
@@ -67,9 +69,9 @@ def _without(
     scatter = problem.blocks[chosen]
     if solution.weights is None:
         K = problem.residual_map(solution.linear)
-        data = (K, problem.T, scatter, problem.acceleration[classes], problem.wrench[classes])
-        _, gradient, _ = noise_cost.derivatives(*data)
-        _, _, plain = noise_cost.information(*data)
+        rows = Rows(problem.T, scatter, problem.acceleration[classes], problem.wrench[classes])
+        _, gradient, _ = noise_cost.derivatives(K, *rows)
+        _, _, plain = noise_cost.information(K, *rows)
     else:
         plain, g = normal_equations(problem.T, scatter, solution.weights[classes])
         gradient = 2 * (plain @ solution.linear - g)
@@ -78,7 +80,6 @@ def _without(
     return moved, np.einsum("ij,jk,ik->i", K, scatter.sum(0), K)
 
 
-def _jackknife(refits: Array) -> Array:
+def _spread(refits: Array) -> Array:
     """Return the jackknife standard deviation (10,) of leave-one-out refits (B, 10)."""
-    blocks = len(refits)
-    return np.asarray(np.sqrt((blocks - 1) / blocks * ((refits - refits.mean(0)) ** 2).sum(0)))
+    return np.sqrt(np.diag(jackknife(refits - refits.mean(0))))

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.cost.dense import downhill
+from steelyard.identify.cost.dense import downhill, product, product_transposed
 from steelyard.identify.cost.noise_cost import derivatives, residual_map_of
 
 # Newton converges quadratically: once the cost can fall by no more than this (half squared standard deviations), two
@@ -106,13 +106,10 @@ def jacobian(theta: Array, U: Array) -> Array:
     out = np.empty((10, 10))
     scale = np.exp(theta[0])
     for k in range(10):
-        half = np.zeros((4, 4))
         if k == 0:
-            for i in range(4):
-                for j in range(4):
-                    for a in range(4):
-                        half[i, j] += U[i, a] * U[j, a]
+            half = product_transposed(U, U)
         else:
+            half = np.zeros((4, 4))
             step = scale * (np.exp(theta[k]) if k <= 3 else 1.0)
             for j in range(4):
                 half[_ROW[k], j] = step * U[j, _COLUMN[k]]
@@ -132,11 +129,7 @@ def _curvature(theta: Array, U: Array, g: Array) -> Array:
     scale = np.exp(theta[0])
     out = np.zeros((10, 10))
     first = np.zeros(10)
-    gU = np.zeros((4, 4))
-    for i in range(4):
-        for j in range(4):
-            for a in range(4):
-                gU[i, j] += gamma[i, a] * U[a, j]
+    gU = product(gamma, U)
     step = np.empty(10)
     for k in range(1, 10):
         step[k] = scale * (np.exp(theta[k]) if k <= 3 else 1.0)
@@ -186,12 +179,7 @@ def linear_of(u: Array) -> Array:
     """Return [phi, bias] (p,) from u = [theta, bias]."""
     out = u.copy()
     U = factor(u[:10])
-    P = np.zeros((4, 4))
-    for i in range(4):
-        for j in range(4):
-            for a in range(4):
-                P[i, j] += U[i, a] * U[j, a]
-    phi = vector_of(P)
+    phi = vector_of(product_transposed(U, U))
     for k in range(10):
         out[k] = phi[k]
     return out

@@ -13,10 +13,12 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from scipy.special import softmax
 
 from steelyard.check import Array
 from steelyard.identify.cost.dense import cholesky, downhill, eigen, inner, moved, times
 from steelyard.identify.cost.linear import inverse_scaled
+from steelyard.identify.mixture import spread_of
 from steelyard.logs.log import Integers
 
 # Log density [kg/m^3] of everyday solids: wood to brass lies within one and a half deviations.
@@ -259,15 +261,5 @@ def averaged(masses: Array, evidence: Array, spread: Array) -> tuple[Array, Arra
     Models count by their evidence, whatever their family. The covariance is that about the mean with evidence annealed:
     a model that is simple and slightly wrong wins by more than it should where noise hides what it leaves out.
     """
-    mean = _weights(evidence) @ masses
-    return mean, spread_of(_weights(TRUST * evidence), masses - mean, spread)
-
-
-def spread_of(weight: Array, off: Array, covariance: Array) -> Array:
-    """Return the covariance (P, P) of models (N,) by weight, each `off` (N, P) the mean and (N, P, P) about itself."""
-    return np.asarray(np.tensordot(weight, covariance, 1) + (weight * off.T) @ off)
-
-
-def _weights(evidence: Array) -> Array:
-    weights = np.exp(evidence - evidence.max())
-    return np.asarray(weights / weights.sum())
+    mean = softmax(evidence) @ masses
+    return mean, spread_of(softmax(TRUST * evidence), masses - mean, spread)

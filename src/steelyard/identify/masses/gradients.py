@@ -8,7 +8,7 @@ Source: own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -79,12 +79,7 @@ class Search:
 
     data: Effective
     parts: Parts
-    profiles: dict[int, Profile]
-
-    @classmethod
-    def of(cls, data: Effective, parts: Parts) -> Search:
-        """Return the search on what a log says; profiles are made when needed."""
-        return cls(data, parts, {})
+    profiles: dict[int, Profile] = field(default_factory=dict)
 
     def even(self) -> list[Fit]:
         """Return the fits of homogeneous parts, one for each spread of densities."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from steelyard.check import Array
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.masses.findings import misfit_limit
 from steelyard.identify.masses.models import Masses
 from steelyard.identify.masses.placement import consistent, refused, with_mass
-from steelyard.identify.masses.recentred import nearest_body, strayed
+from steelyard.identify.masses.recentred import followed, strayed
 from steelyard.identify.masses.shape_error import ShapeError
 from steelyard.inertia import InertialParameters
 from steelyard.parts.parts import Parts
@@ -64,16 +62,8 @@ def loosened(
         if seen.misfit(body.vector) < limit:
             break
     with_mass(parts, masses.mean, data, LEAST_MASS)
-    gain = error @ seen.information
-    rest = np.eye(10) - gain
-    B = parts.per_mass
-    spread = B @ masses.covariance @ B.T
-    moved = body.vector + error @ seen.pull - gain @ body.vector
-    covariance = rest @ spread @ rest.T + error - gain @ error
-    whole, fits = nearest_body(body.vector, moved), seen.misfit(body.vector) < limit
-    if not fits and strayed(data, whole) > limit:
+    placed, fits = followed(data, body, error), seen.misfit(body.vector) < limit
+    if not fits and strayed(data, placed.body) > limit:
         raise refused(parts, data)
-    blur = data.left_by(error)
-    masses_follow = spread @ blur
-    follows = masses_follow + error @ (blur - seen.information @ masses_follow)
-    return Loosened(masses, whole, covariance, follows, 2**doubling, fits)
+    spread = parts.per_mass @ masses.covariance @ parts.per_mass.T
+    return Loosened(masses, *placed.known(data, spread, error), 2**doubling, fits)

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+from scipy.special import softmax
 
 from steelyard.check import Array
-from steelyard.identify.masses.density_priors import TRUST, log_det, mode, spread_masses, spread_of
+from steelyard.identify.masses.density_priors import TRUST, log_det, mode, spread_masses
 from steelyard.identify.masses.material_sampling import draw, material_prior
+from steelyard.identify.mixture import spread_of
 from steelyard.logs.log import Integers, Mask
 from steelyard.parts.material import Material
 
@@ -78,8 +80,7 @@ def choose(A: Array, b: Array, volume: Array, materials: Sequence[Material], fre
     if P == 1 or K**P <= EXHAUSTIVE:
         tried = np.stack(np.meshgrid(*[np.arange(K)] * P, indexing="ij"), -1).reshape(-1, P)
         found = _all(A, b, volume, np.log(density), tolerance, tried)
-        power = np.exp(np.outer([1.0, TRUST], found[1] - found[1].max()))
-        return Choices(*found, tried, *(power / power.sum(1)[:, None]))
+        return Choices(*found, tried, *softmax(np.outer([1.0, TRUST], found[1]), axis=1))
     near = np.abs((np.log(np.maximum(free, 1e-9) / volume)[:, None] - np.log(density)) / tolerance).argmin(1)
     drawn = draw(A, b, volume, density, tolerance, near)
     tried, place = np.unique(np.concatenate(drawn), axis=0, return_inverse=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.evidence import PartMass
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.masses import density_priors
 from steelyard.identify.masses.material_choice import Choices, choose
@@ -23,6 +24,15 @@ class Masses:
     mean: Array
     covariance: Array
     choices: Choices | None = None
+
+
+def weighed(
+    parts: Parts, mean: Array, covariance: Array, materials: Sequence[str | None] | None = None
+) -> tuple[PartMass, ...]:
+    """Return parts with masses (P,) [kg] of a covariance (P, P), and the names of their materials where known."""
+    std, names = np.sqrt(np.maximum(np.diag(covariance), 0)), materials or [None] * len(parts)
+    rows = zip(parts.label, mean, std, parts.volume, parts.centroid, names, strict=True)
+    return tuple(PartMass(int(k), float(m), float(s), float(v), c, name) for k, m, s, v, c, name in rows)
 
 
 def free_masses(data: Effective, parts: Parts) -> Masses:
@@ -56,12 +66,6 @@ def material_masses(data: Effective, parts: Parts, materials: Sequence[Material]
     choices = choose(A, b, parts.volume, materials, guess)
     mean, covariance = choices.mixture()
     return Masses(mean, covariance, choices)
-
-
-def mixture(weight: Array, means: Sequence[Array], covariances: Sequence[Array]) -> tuple[Array, Array]:
-    """Return mean (n,) and covariance (n, n) of a mixture with weights (K,), the spread between its means included."""
-    mean = weight @ np.stack(means)
-    return mean, density_priors.spread_of(weight, np.stack(means) - mean, np.stack(covariances))
 
 
 def _in_masses(data: Effective, parts: Parts) -> tuple[Array, Array]:

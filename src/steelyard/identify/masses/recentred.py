@@ -39,17 +39,16 @@ class Recentred:
     error: Array
     gain: Array
 
-    def following(self, data: Effective, before: Array) -> Array:
-        """Return how phi follows F phi_hat (10, 10), where it did by `before` (10, 10) until it was moved."""
-        return np.asarray(before + self.gain @ (np.eye(10) - data.information @ before))
+    def known(self, data: Effective, spread: Array, error: Array) -> tuple[InertialParameters, Array, Array]:
+        """Return the body, its covariance (10, 10) with that of its masses, and how it follows F phi_hat (10, 10).
 
-    def left_of(self, data: Effective, covariance: Array) -> Array:
-        """Return what is left of the error (10, 10) of masses that a log blurred by the shape's error gave.
-
+        spread  (10, 10) of the body by its masses, which the log gave blurred by the `error` (10, 10) of the shape
         As for Gaussian phi = B m + e: the move is e given m and the log, and makes up for a wrong m.
         """
         rest = np.eye(10) - self.gain @ data.information
-        return np.asarray(rest @ covariance @ rest.T)
+        before = spread @ data.left_by(error)
+        follows = before + self.gain @ (np.eye(10) - data.information @ before)
+        return self.body, np.asarray(rest @ spread @ rest.T + self.error), np.asarray(follows)
 
 
 def recentred(data: Effective, body: InertialParameters, error: Array) -> Recentred:

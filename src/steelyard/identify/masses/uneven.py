@@ -12,8 +12,9 @@ from steelyard.findings import Finding
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.masses.findings import misfit_limit
 from steelyard.identify.masses.gradients import Freed, Search, freed, total
-from steelyard.identify.masses.models import Masses, mixture
+from steelyard.identify.masses.models import Masses
 from steelyard.identify.masses.profiles import Profile
+from steelyard.identify.mixture import mixture
 from steelyard.parts.parts import Parts
 
 # Worth a look: a chi-square that right, homogeneous parts exceed once in so many logs.
@@ -44,7 +45,7 @@ def suspicious(data: Effective, vector: Array, parts: Parts) -> bool:
 
 def uneven(data: Effective, parts: Parts) -> Uneven | None:
     """Return the answer averaged over freed parts, None where homogeneous ones are likely enough or nothing fits."""
-    search = Search.of(data, parts)
+    search = Search(data, parts)
     homogeneous = search.even()
     fits = freed(search, homogeneous, misfit_limit(data, len(parts), SUSPICIOUS))
     if not fits or total(fits) - total(homogeneous) < np.log(ODDS):

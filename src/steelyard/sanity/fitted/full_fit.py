@@ -12,11 +12,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from steelyard.check import Array, Integers
+from steelyard.identify.cost import left_out
 from steelyard.identify.cost.linear import inverse_scaled
 from steelyard.inertia.regressor import design, motion_map
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
-from steelyard.logs.noise import robust_std
+from steelyard.logs.noise import mean_heard, robust_std
 from steelyard.logs.runs import picked
 from steelyard.spatial import cross_matrix
 
@@ -124,15 +125,15 @@ class Rows:
         """Return the solution with extra columns (N, 6, k)."""
         X = self._with(extra)
         both = np.concatenate([X, self.values[:, :, None]], 2) * np.sqrt(self.weights)[:, :, None]
-        blocks = int(self.block.max()) + 1
-        scatter = np.stack([_gram(both[self.block == b]) for b in range(blocks)]) if jackknife else _gram(both)[None]
+        # Blocks are few and wide: to gather them for one product (`block_scatter`) would cost more than it saves.
+        blocks = range(int(self.block.max()) + 1)
+        scatter = np.stack([_gram(both[self.block == b]) for b in blocks]) if jackknife else _gram(both)[None]
         total, size = scatter.sum(0), X.shape[2]
-        solution = _solution(total, size)
+        solution = left_out.solutions(total[None], RANK, 0.0)[0]
         left = float(total[size, size] - 2 * solution @ total[:size, size] + solution @ total[:size, :size] @ solution)
         covariance = np.zeros((size, size))
-        if jackknife and blocks > 2:
-            moved = np.stack([_solution(total - s, size) for s in scatter]) - solution
-            covariance = (blocks - 1) / blocks * moved.T @ moved
+        if len(scatter) > 2:
+            covariance = left_out.jackknife(left_out.solutions(total - scatter, RANK, 0.0) - solution)
         return FullFit(solution, covariance, max(left, 0.0), self.columns.shape[2])
 
     def told(self, extra: Array, least: float) -> Array:
@@ -189,10 +190,6 @@ def _gram(rows: Array) -> Array:
     return np.asarray(flat.T @ flat)
 
 
-def _solution(scatter: Array, size: int) -> Array:
-    return np.asarray(inverse_scaled(scatter[:size, :size].copy(), RANK) @ scatter[:size, size])
-
-
 def _weights(rows: Rows, solution: Array) -> Array:
     """Return inverse variances (N, 6) of the residuals, by class of rows and kind of channel."""
     miss = rows.values - rows.columns @ solution
@@ -200,8 +197,7 @@ def _weights(rows: Rows, solution: Array) -> Array:
     for kind in np.unique(rows.log.noise_class):
         at = rows.log.noise_class == kind
         variance = robust_std(miss[at]) ** 2 + 0.01 * miss[at].var(0)
-        mean = (variance * heard).reshape(2, 3).sum(1) / np.maximum(heard.reshape(2, 3).sum(1), 1)
-        out[at] = heard / np.maximum(np.repeat(mean, 3), _SMALLEST**2)
+        out[at] = heard / np.maximum(np.repeat(mean_heard(variance, heard), 3), _SMALLEST**2)
     return out
 
 

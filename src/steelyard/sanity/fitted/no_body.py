@@ -17,7 +17,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.evidence import PartMass
-from steelyard.findings import Finding
+from steelyard.findings import Finding, other_than
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.masses.shape_error import HOLLOW, ShapeError
 from steelyard.inertia import InertialParameters
@@ -96,7 +96,7 @@ def examine_wrench_unit(
         "this: mass or centre of mass is wrong by as much."
     )
     unit = replace(Finding.of("force-unit", text), left_in=True)
-    return (unit, *(f for f in late if f.code != "wrench-unexplained"))
+    return (unit, *other_than(late, "wrench-unexplained"))
 
 
 def examine_body(

@@ -14,12 +14,14 @@ import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.findings import Finding, about
-from steelyard.identify.cost.linear import inverse_scaled
+from steelyard.identify.cost.left_out import block_scatter, jackknife, solutions
 from steelyard.sanity.readings.glance import Glance, Seen
 from steelyard.spatial import cross_matrix
 
 # A fit that leaves less than this share of the variance is as good as perfect: no rival can be better.
 LEAST_SHARE = 1e-4
+# Directions below the first share of the largest, and columns below the second of all squares, say nothing.
+RANK, SILENT = 1e-6, 1e-12
 # Gravity that moves about in S by less than this share of its size tells no weight from a bias.
 TURNING = 0.05
 
@@ -115,7 +117,7 @@ def solve(columns: Array, values: Array, block: Integers) -> tuple[Array, Array,
     """
     count, size = len(values), columns.shape[2]
     total, solution, left_out = leave_out(columns, values, block)
-    spread = np.sqrt((len(left_out) - 1) / len(left_out) * ((left_out - solution) ** 2).sum(0))
+    spread = np.sqrt(np.diag(jackknife(left_out - solution)))
     variance = float(total[size, size])
     left = variance - float(solution @ total[:size, size])
     freedom = max(3 * count - 3 - size, 1) / max(3 * count - 3, 1)
@@ -125,26 +127,11 @@ def solve(columns: Array, values: Array, block: Integers) -> tuple[Array, Array,
 
 def leave_out(columns: Array, values: Array, block: Integers) -> tuple[Array, Array, Array]:
     """Return the centred scatter (k+1, k+1), its solution (k,) and the solutions (B, k) without one block each."""
-    size = columns.shape[2]
     both = np.concatenate([columns, values[:, :, None]], 2)
-    both = both - both.mean(0)
-    order = np.argsort(block, kind="stable")
-    starts = np.flatnonzero(np.diff(block[order], prepend=-1))
-    groups = np.split(both[order], starts[1:])
-    scatter = np.stack([g.reshape(-1, size + 1).T @ g.reshape(-1, size + 1) for g in groups])
+    scatter = block_scatter(both - both.mean(0), block)
     total = scatter.sum(0)
-    rest = total - scatter
-    left_out = np.stack([_least_norm(r[:size, :size], r[:size, size]) for r in rest])
-    return total, _least_norm(total[:size, :size], total[:size, size]), left_out
-
-
-def _least_norm(matrix: Array, vector: Array) -> Array:
-    """Return the least-norm solution after scaling the columns to one."""
-    size = float(np.trace(matrix))
-    if not size > 1e-200:
-        return np.zeros(len(vector))
-    # Columns of less than this share of all squares say nothing.
-    return np.asarray(inverse_scaled(matrix + 1e-12 * size * np.eye(len(vector)), 1e-6) @ vector)
+    found = solutions(np.concatenate([total[None], total - scatter]), RANK, SILENT)
+    return total, found[0], found[1:]
 
 
 def masses_at_a_glance(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.findings import Finding
+from steelyard.identify.cost.left_out import jackknife
 from steelyard.sanity.readings.glance import Glance, Seen
 from steelyard.sanity.readings.static_fit import beside, better_fit, leave_out, solve
 from steelyard.sanity.words import axis_words
@@ -74,7 +75,7 @@ def tilt_at_a_glance(view: Glance, gravity: Array, rotation: Array | None, mass:
     if weight is None:
         return None
     found = sign * weight * np.linalg.norm(gravity) / np.linalg.norm(weight)
-    angle = angle_between(found, gravity)
+    angle = float(angle_between(found, gravity))
     best = better_fit(view, found, rotation)
     unseen = None if np.trace(shown) > 2.5 else np.asarray(np.linalg.eigh(shown)[1][:, 0])
     return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, unseen)
@@ -98,21 +99,20 @@ def free_direction(
     k = shown.shape[1]
     _, all_rows, left_out = leave_out(beside(columns @ shown, lever), force, block)
 
-    def weight(part: Array) -> Array:
+    def weights(found: Array) -> Array:
         # The unseen part of gravity keeps its share: the seen part gives the weight.
-        u = shown @ part[:k]
-        scale = np.linalg.norm(u) / max(float(np.linalg.norm(seen @ gravity)), 1e-9)
-        return np.asarray(u + scale * (gravity - seen @ gravity))
+        u = found[:, :k] @ shown.T
+        scale = np.linalg.norm(u, axis=1) / max(float(np.linalg.norm(seen @ gravity)), 1e-9)
+        return np.asarray(u + scale[:, None] * (gravity - seen @ gravity))
 
-    everything = weight(all_rows)
-    angles = np.array([angle_between(weight(part), everything) for part in left_out])
-    count = len(angles)
-    return everything, float(np.sqrt((count - 1) / count * (angles**2).sum())), seen
+    everything = weights(all_rows[None])[0]
+    angles = angle_between(weights(left_out), everything)
+    return everything, float(np.sqrt(jackknife(angles[:, None])[0, 0])), seen
 
 
-def angle_between(a: Array, b: Array) -> float:
-    """Return the angle [rad] between two vectors (3,)."""
-    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+def angle_between(a: Array, b: Array) -> Array:
+    """Return the angle (..) [rad] between vectors (.., 3) and a vector (3,)."""
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), a @ b))
 
 
 def force_and_weight(seen: Seen, sign: float) -> tuple[Array, Array]:
