@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -51,6 +52,11 @@ def misses(estimate: Estimate) -> np.ndarray:
     return np.asarray((estimate.parameters.people - truth.people)[:4] / estimate.std[:4])
 
 
+def said_to_pull(estimate: Estimate) -> list[str]:
+    """Return the notes on a pull in the room."""
+    return [note for note in estimate.notes if "pulls by" in note]
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_moving_log_is_answered_without_it(seed: int) -> None:
     found = sy.identify(biased(hammer.recording(seed).recording))
@@ -73,7 +79,24 @@ def test_still_poses_leave_the_part_along_gravity_to_the_bar_of_the_mass() -> No
 def test_a_sound_log_keeps_its_answer(seed: int) -> None:
     found = sy.identify(hammer.recording(seed).recording)
     assert "bias-drift" not in found.codes()
+    assert not said_to_pull(found)
     assert found.std[0] < 1e-3 * found.mass
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_small_pull_is_said_with_what_its_like_along_gravity_would_do(seed: int) -> None:
+    """A cable's 0.03 N up made masses three bars too small, and nothing said so."""
+    pull = np.array([0.0, 0.0, 0.0, 0.024, -0.018, 0.018])
+    found = sy.identify(biased(hammer.recording(seed).recording, pull))
+    assert "bias-drift" not in found.codes()
+    (note,) = said_to_pull(found)
+    newton, kilogram = (float(re.search(rf"by ([\d.]+)( ± [\d.]+)? {unit} ", note)[1]) for unit in ("N", "kg,"))
+    assert newton == pytest.approx(0.03, rel=0.15)
+    assert kilogram == pytest.approx(newton / 9.81, rel=0.1)
+
+
+def test_what_is_taken_out_is_not_said_to_pull_as_well() -> None:
+    assert not said_to_pull(sy.identify(biased(hammer.recording(0).recording)))
 
 
 def test_a_tilted_base_is_none() -> None:

@@ -76,6 +76,36 @@ def test_a_hung_driver_is_named(recording: Recording) -> None:
     assert codes(with_wrench(recording, hung)) == ["channel-stuck"]
 
 
+def turning(noise: float, held: slice) -> Stream:
+    """Return noisy forces beside poses that turn slowly, stop for a second, and stand still in these rows."""
+    rng = np.random.default_rng(4)
+    time = np.arange(1000) / 100
+    angle = 0.3 * np.where(time < 5, time, np.maximum(time - 1, 5))
+    turns = np.stack([angle, 0.5 * angle, 0 * angle], 1) + noise * rng.normal(size=(1000, 3))
+    turns[held] = turns[held.start]
+    channels = {"rotation": Rotation.exp(turns).matrix, "force": rng.normal(size=(1000, 3))}
+    return Stream("a.csv", channels, time=time)
+
+
+@pytest.mark.parametrize("with_force", [True, False])
+def test_hung_poses_are_left_out_though_the_wrench_goes_on(with_force: bool) -> None:
+    """They were reported as a hand on the object."""
+    stream = turning(1e-5, slice(200, 400))
+    if not with_force:
+        stream = replace(stream, channels={"rotation": stream.channels["rotation"]})
+    seen, (finding,) = without_frozen(stream)
+    assert finding.code == "channel-stuck"
+    assert "The pose of 'a.csv' stands still in 200 of 1000 rows and jumps after" in finding.message
+    assert len(seen) == 800
+
+
+@pytest.mark.parametrize("held", [slice(0, 0), slice(200, 400)])
+def test_poses_without_noise_that_stand_still_at_rest_are_measurements(held: slice) -> None:
+    """The second leaps after one rest, as where parts of logs were joined."""
+    stream = turning(0.0, slice(0, 1) if held.stop == 0 else held)
+    assert without_frozen(stream) == (stream, ())
+
+
 def test_a_declared_zero_torque_is_not_stuck(recording: Recording) -> None:
     wrench = wrench_of(recording)
     channels = {**wrench.channels, "torque": np.zeros((len(wrench), 3))}

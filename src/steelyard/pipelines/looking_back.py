@@ -15,7 +15,8 @@ from steelyard.pipelines.load import Load
 from steelyard.pipelines.options import DRIFT_ALLOWED
 from steelyard.pipelines.rows import FitRows
 from steelyard.sanity.after import of_answer, of_rows, rotation_of, row_noise
-from steelyard.sanity.fitted.biases import drift_of
+from steelyard.sanity.aside import stands_aside
+from steelyard.sanity.fitted.biases import drift_of, room_fit
 from steelyard.sanity.fitted.load_motion import examine_masses, examine_motion
 from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
 from steelyard.sanity.fitted.sensor_matrix import examine_sensor
@@ -60,6 +61,23 @@ def room_bias_allowed(load: Load, estimate: Estimate, rows: FitRows) -> Estimate
         return estimate
     again = (load.of(without(error, load.log, rotation)) for error in rows.room.bias.errors())
     return estimate.allowing(*(one.parameters.vector - estimate.parameters.vector for one in again))
+
+
+def pulled(
+    load: Load, estimate: Estimate, rows: FitRows, recording: Recording, known: tuple[Finding, ...]
+) -> tuple[str, ...]:
+    """Return a note on a likely pull that keeps its direction in the room, where its like along gravity is a bar.
+
+    known  all that was found so far
+    """
+    rotation = rotation_of(load.log, rows.aligned)
+    other = stands_aside("room bias", known) or any(f.left_in for f in known)
+    if other or rows.room is not None or rotation is None or load.options.gravity != "given":
+        return ()
+    seen, size = room_fit(load.log, rotation, recording.gravity, load.bias.drift), np.linalg.norm(recording.gravity)
+    if seen is None or not seen.pulls or np.linalg.norm(seen.force) < size * estimate.std[0]:
+        return ()
+    return (seen.note(float(size)),)
 
 
 def not_tared(load: Load, estimate: Estimate) -> tuple[Finding, ...]:

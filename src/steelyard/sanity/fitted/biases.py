@@ -29,6 +29,8 @@ _FEWEST_ROWS = 8
 SURE, SLOWLY = 8.0, 0.5
 # ... and so much less of that than another direction of gravity, which has fewer numbers.
 BETTER = 0.8
+# From so many standard deviations on it is likely: sound made logs stay below 2.5.
+LIKELY = 4.0
 # Axes of it that a body and a bias of the sensor mimic to this share of their squares are not told.
 TOLD = 1e-3
 REMEDY = (
@@ -130,6 +132,44 @@ class SeenRoomBias:
         return Finding("bias-drift", text, REMEDY)
 
 
+@dataclass(frozen=True, eq=False)
+class RoomFit:
+    """What a log shows of a bias in W by all of it that weight does not mimic: torque, and force across gravity.
+
+    force, std  (3,) [N] across gravity in W; its standard deviation along itself, by leaving out stretches
+    times       of how many such standard deviations the surest direction is
+    slowly      what it leaves of means over a second, beside what no such bias leaves
+    tilted      the same beside what another direction of gravity leaves
+    best        whether it leaves less than a turned sensor, unlike gains or another point
+    """
+
+    force: Array
+    std: float
+    times: float
+    slowly: float
+    tilted: float
+    best: bool
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is beyond doubt, and explains more than any other cause."""
+        return self.times > SURE and self.slowly <= SLOWLY and self.tilted <= BETTER and self.best
+
+    @property
+    def pulls(self) -> bool:
+        """Whether it is likely, and its force across gravity shows."""
+        return float(np.linalg.norm(self.force)) > LIKELY * self.std and self.tilted < 1 and self.best
+
+    def note(self, gravity: float) -> str:
+        """Say what as much along gravity [m/s^2] would do, which nothing shows."""
+        size = float(np.linalg.norm(self.force))
+        return (
+            f"beside the weight something pulls by {size:.2g} ± {self.std:.1g} N across gravity, in one direction of "
+            f"the room, as a cable does: as much along gravity would move the mass by {size / gravity:.2g} kg, and no "
+            "log shows it; let the cable hang loose, or weigh a known mass once"
+        )
+
+
 def examine_room_bias(
     log: MotionLog, rotation: Array | None, gravity: Array, sign: int, bias: Bias
 ) -> SeenRoomBias | None:
@@ -138,34 +178,39 @@ def examine_room_bias(
     rotation  (N, 3, 3) S to W at the rows     gravity  (3,) [m/s^2] in W
     sign      of the recording's raw channels     bias  that of the sensor
     """
-    if rotation is None or not _seen(log, rotation, gravity, bias.drift):
+    found = None if rotation is None else room_fit(log, rotation, gravity, bias.drift)
+    if rotation is None or found is None or not found.sure:
         return None
     return SeenRoomBias(room_bias(log, rotation, gravity, bias), gravity / np.linalg.norm(gravity), sign)
 
 
-def _seen(log: MotionLog, rotation: Array, gravity: Array, drift: bool) -> bool:
-    """Return whether such a bias is sure, by all of it that weight does not mimic, and the best cause."""
+def room_fit(log: MotionLog, rotation: Array, gravity: Array, drift: bool) -> RoomFit | None:
+    """Return what a log shows of a bias in W; None where it is too short, shows none of it, or hardly any."""
     rows, pick = Rows.of(log, drift)
     once = rows.solve()
     slow = rows.slowly(once)
     if not rows.split or not slow:
-        return False
+        return None
     R, level = np.swapaxes(rotation[pick], 1, 2), np.linalg.svd(gravity[None])[2][1:].T
     columns = np.zeros((len(R), 6, 5))
     columns[:, :3, :3], columns[:, 3:, 3:] = R, R @ level
     told = rows.told(columns, TOLD)
     if not told.size:
-        return False
+        return None
     columns = columns @ told
     fit = rows.solve(columns, jackknife=True)
-    slowly = rows.slowly(fit, columns)
-    if not (np.abs(fit.extra) > SURE * fit.extra_std).any() or slowly > SLOWLY * slow:
-        return False
+    times = float((np.abs(fit.extra) / np.maximum(fit.extra_std, 1e-300)).max())
+    if times < LIKELY:
+        return None
+    force = level @ told[3:] @ fit.extra
+    along = force / max(float(np.linalg.norm(force)), 1e-300) @ level @ told[3:]
+    std = float(np.sqrt(along @ fit.extra_covariance @ along))
     tilting = rows.tilting(once.phi, rotation[pick], gravity) @ level
-    if slowly > BETTER * rows.slowly(rows.solve(tilting), tilting):
-        return False
+    slowly, tilted = rows.slowly(fit, columns), rows.slowly(rows.solve(tilting), tilting)
     left = fit.beside(once)
-    return all(other is None or left < other.left for other in (sensor_matrix(log, drift), misplaced(log, drift)))
+    others = sensor_matrix(log, drift), misplaced(log, drift)
+    best = all(other is None or left < other.left for other in others)
+    return RoomFit(force, std, times, slowly / slow, slowly / max(tilted, 1e-300), best)
 
 
 def _numbers(vector: Array) -> str:

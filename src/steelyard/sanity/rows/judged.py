@@ -23,6 +23,7 @@ FROZEN_ROWS, FROZEN_S = 50, 0.25
 
 # Rows in which gravity and forces are the same to so small a share of themselves repeat a pose without noise.
 SAME_PULL = 1e-6
+_POSE = ("rotation", "position")
 _MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 
 
@@ -86,9 +87,11 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     found: list[tuple[str, str]] = []
     if stream.time is None or len(stream) < 4 * FROZEN_ROWS:
         return stream, ()
-    frozen = _hung_rows(stream)
-    if frozen.any():
-        found.append(("every channel", f"stands still in {int(frozen.sum())} of {len(frozen)} rows and jumps after"))
+    frozen = np.zeros(len(stream), bool)
+    for name, rows in (("every channel", _hung_rows(stream)), ("the pose", _hung_poses(stream))):
+        if rows.any() and not frozen.any():
+            found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and jumps after"))
+            frozen = rows
     for quantity in (q for q in NOISY if q in stream.channels):
         values = stream.channels[quantity]
         same = values[1:] == values[:-1]
@@ -135,20 +138,49 @@ def _dead(values: Array) -> Mask:
 
 def _hung_rows(stream: Stream) -> Mask:
     """Return rows (N,) in which a noisy stream repeats one row for long and then jumps, as a hung driver does."""
-    values, none = columns_of(stream), np.zeros(len(stream), bool)
-    if not set(NOISY) & set(stream.channels) or stream.time is None or not values.shape[1]:
+    none = np.zeros(len(stream), bool)
+    if not set(NOISY) & set(stream.channels):
         return none
+    return _any_of(_hung(columns_of(stream), stream), none)
+
+
+def _hung_poses(stream: Stream) -> Mask:
+    """Return rows (N,) in which noisy poses stand still and then jump, while a wrench beside them may go on.
+
+    Poses without noise stand still at every rest, and jump after one where parts of logs were joined: they are noisy
+    where each stretch without change ends in a jump.
+    """
+    none = np.zeros(len(stream), bool)
+    if "rotation" not in stream.channels:
+        return none
+    poses = {q: stream.channels[q] for q in _POSE if q in stream.channels}
+    held = _hung(columns_of(replace(stream, channels=poses)), stream)
+    return _any_of(held, none) if all(jumps for _, _, jumps in held) else none
+
+
+def _any_of(held: list[tuple[int, int, bool]], none: Mask) -> Mask:
+    """Return the rows (N,) of the stretches that jump after."""
+    rows = none.copy()
+    for start, stop, jumps in held:
+        rows[start:stop] |= jumps
+    return rows
+
+
+def _hung(values: Array, stream: Stream) -> list[tuple[int, int, bool]]:
+    """Return the first row and the last + 1 of long stretches of equal values (N, K), and whether they jump after.
+
+    None are where values repeat elsewhere, too, or stand still more than three times.
+    """
+    if stream.time is None or not values.shape[1]:
+        return []
     same = (values[1:] == values[:-1]).all(1)
     long = lasting(same, _rows_needed(stream.time))
     held = runs(long)
     if not 1 <= len(held) <= 3 or same[~long].mean() > 0.05:
-        return none
+        return []
     steps = np.abs(np.diff(values, axis=0))
     typical = np.maximum(np.median(steps[~long], 0), 1e-300)
-    for start, stop in held:
-        if stop < len(steps) and (steps[stop] > 5 * typical).any():
-            none[start : stop + 1] = True
-    return none
+    return [(a, b + 1, b < len(steps) and bool((steps[b] > 5 * typical).any())) for a, b in held.tolist()]
 
 
 def _frozen_rows(column: Array, time: Array) -> Mask:
