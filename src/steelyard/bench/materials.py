@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from steelyard.bench.asked import Progress, require_one, told
-from steelyard.bench.objects.cases import SAME_DENSITY, Case, load_case, noisy_rows
+from steelyard.bench.objects.cases import SAME_DENSITY, Case, densities, load_case, noisy_rows
 from steelyard.bench.objects.folders import chosen_folders
-from steelyard.errors import BadValue, SteelyardError
+from steelyard.errors import SteelyardError
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_masses import PartMasses
 from steelyard.parts.material import Material
@@ -70,16 +68,10 @@ def material_list(case: Case) -> tuple[Material, ...]:
     if not any("mass_kg" in row for row in case.known.facts.get("parts", ())):
         return PUBLISHED
     out: list[Material] = []
-    for name, density in zip(case.known.part_materials, _densities(case), strict=True):
+    for name, density in zip(case.known.part_materials, densities(case.parts, case.part_masses), strict=True):
         if not any(_same(m.density, density) for m in out):
             out.append(Material(f"{name} {density:.0f}", float(density), OWN_TOLERANCE))
     return tuple(out)
-
-
-def _densities(case: Case) -> list[float]:
-    if case.part_masses is None:
-        raise BadValue(f"{case.known.name}: the true masses of its parts are not known.")
-    return [float(d) for d in case.part_masses / case.parts.volume]
 
 
 def _same(one: float, other: float) -> bool:
@@ -89,8 +81,8 @@ def _same(one: float, other: float) -> bool:
 def _object(case: Case, seeds: int, failures: list[str]) -> dict[str, Any]:
     """Return the counts of one object, and for each counted part what was picked how often."""
     materials = material_list(case)
-    density = _densities(case)
-    masses = np.array(density) * case.parts.volume
+    density = densities(case.parts, case.part_masses)
+    masses = density * case.parts.volume
     true = [next((m for m in materials if _same(m.density, d)), None) for d in density]
     counted = [k for k in range(len(density)) if masses[k] >= COUNTED * masses.sum()]
     picks: dict[int, dict[str, int]] = {k: {} for k in counted}

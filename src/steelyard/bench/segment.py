@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from steelyard.bench.asked import Progress, told
 from steelyard.bench.objects.folders import chosen_folders
@@ -23,6 +22,7 @@ from steelyard.parts.segment import coloured_pieces, parts_of_pieces
 from steelyard.parts.segmentation import Segmentation
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.orient import oriented
+from steelyard.shape.points.spacing import nearest
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import enclose
 from steelyard.spatial import Pose, Rotation, area_vectors
@@ -216,8 +216,8 @@ def _told(known: KnownObject, cloud: Cloud, volume: float) -> dict[str, float]:
     """Return what the ratio to the true volume would be, were the normals given, or which side of ours is out."""
     used = enclose(Cloud(cloud.xyz)).cloud
     shown, facing = _outside(known.mesh.corners, OUTSIDE_POINTS)
-    row = cKDTree(cloud.xyz).query(used.xyz)[1]  # without those that were left out
-    normals, own = facing[cKDTree(shown).query(known.cloud.xyz[row])[1]], np.asarray(used.normals)
+    row = nearest(cloud.xyz, used.xyz)  # without those that were left out
+    normals, own = facing[nearest(shown, known.cloud.xyz[row])], np.asarray(used.normals)
     sides = np.where((own * normals).sum(1) < 0, -1.0, 1.0)[:, None]
     told = {"volume_ratio_true_sides": sides * own, "volume_ratio_true_normals": normals}
     return {name: enclose(Cloud(used.xyz, normals=given)).mesh.volume / volume for name, given in told.items()}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numba
 import numpy as np
-from scipy.spatial import ConvexHull, Delaunay, cKDTree
+from scipy.spatial import ConvexHull, Delaunay
 
 from steelyard.bench.asked import Progress, told
 from steelyard.bench.shapes import hull_sets
@@ -25,6 +25,7 @@ from steelyard.shape.inside import inside
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.nesting import body_of
 from steelyard.shape.pairs import joined
+from steelyard.shape.points.spacing import nearest
 from steelyard.shape.tets import TetMesh
 from steelyard.workshop.catalogue import build
 from steelyard.workshop.sampling import spread_evenly, surface_cloud
@@ -116,8 +117,8 @@ def skin_volume(skin: TriangleMesh) -> float:
 
 def _depth(points: Array, xyz: Array, normal: Array) -> Array:
     """Return how far points lie above the surface samples nearest to them, below zero inside."""
-    nearest = cKDTree(xyz).query(points)[1]
-    return np.asarray(((points - xyz[nearest]) * normal[nearest]).sum(1))
+    row = nearest(xyz, points)
+    return np.asarray(((points - xyz[row]) * normal[row]).sum(1))
 
 
 def _clustering(tets: int, repeats: int) -> dict[str, Any]:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from steelyard import check
 from steelyard.check import Array, Integers
@@ -15,6 +14,7 @@ from steelyard.report.surfaces import evened, part_skins, thinned
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.mesh import TriangleMesh
+from steelyard.shape.points.spacing import nearest
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import Pose, Rotation
 
@@ -116,7 +116,7 @@ def _colours(vertices: Array, cloud: Cloud | None, colour: Colours) -> Colours:
     """Return a colour (V, 3) per vertex."""
     if cloud is None or cloud.rgb is None:
         return np.tile(colour, (len(vertices), 1))
-    return np.asarray(cloud.rgb[cKDTree(cloud.xyz).query(vertices)[1]])
+    return np.asarray(cloud.rgb[nearest(cloud.xyz, vertices)])
 
 
 def _thinned_cloud(cloud: Cloud | None) -> Cloud | None:

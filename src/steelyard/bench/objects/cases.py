@@ -121,9 +121,10 @@ def noisy_rows(case: Case, noise: str, seed: int) -> MotionLog:
     return log.rows(rng.permutation(len(log)))
 
 
-def _densities(parts: Parts, masses: Array | None) -> Array:
+def densities(parts: Parts, masses: Array | None) -> Array:
+    """Return what parts of these masses (P,) are made of (P,) [kg/m^3]; raises BadValue where they are not known."""
     if masses is None:
-        raise BadValue("The true masses of the parts are not in truth.json, so parts cannot be merged by density.")
+        raise BadValue("The true masses of the parts are not in truth.json, so neither are their densities.")
     return masses / parts.volume
 
 
@@ -131,7 +132,7 @@ def _same_density(parts: Parts, masses: Array | None) -> list[list[int]]:
     """Return groups of parts with one density; every part alone where densities are not known."""
     if masses is None:
         return [[k] for k in range(len(parts))]
-    density = _densities(parts, masses)
+    density = densities(parts, masses)
     groups: list[list[int]] = []
     for k in range(len(parts)):
         home = next((g for g in groups if abs(density[g[0]] / density[k] - 1) < SAME_DENSITY), None)
@@ -144,7 +145,7 @@ def _same_density(parts: Parts, masses: Array | None) -> list[list[int]]:
 
 def _different_density(parts: Parts, masses: Array | None) -> list[list[int]] | None:
     """Return groups that join the heaviest two parts of different density, None where there are none."""
-    density = _densities(parts, masses)
+    density = densities(parts, masses)
     mass = density * parts.volume
     pairs = [
         (mass[i] + mass[j], i, j)
