@@ -13,7 +13,7 @@ from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
 from steelyard.logs import clock_jumps, clock_rates
 from steelyard.logs.bandwidth import rigid_up_to
-from steelyard.logs.clock import sampling_rate, stamps_of
+from steelyard.logs.clock import sampling_rate
 from steelyard.logs.clock_jumps import ClockJump, Placed
 from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.delays import Clocks, Question, scan
@@ -139,10 +139,8 @@ def _taps(given: Prepared) -> Array:
     # Delays are not known yet: a tap is far quicker than what they turn.
     wrench = given.wrench(given.known)
     found = [bursts(given.clock, part, margin) for part in (wrench[:, :3], wrench[:, 3:])]
-    for stream in given.recording.streams:
-        if "specific_force" in stream.channels and given.imu is not None:
-            late = given.known.get(stream.name, 0.0)
-            found.append(bursts(stamps_of(stream) - late, stream.channels["specific_force"], margin))
+    for stream, _, values in given.recording.channels("specific_force") if given.imu is not None else ():
+        found.append(bursts(stream.stamps - given.known.get(stream.name, 0.0), values, margin))
     return merged(*found)
 
 
@@ -251,7 +249,7 @@ def _rigid(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> float | 
 
 def _with_interpolation(given: Prepared, stds: Mapping[str, float]) -> dict[str, float]:
     """Return standard deviations that allow for interpolation: a hundredth of a stream's step."""
-    steps = {s.name: 1 / sampling_rate(stamps_of(s)) for s in given.recording.streams}
+    steps = {s.name: 1 / sampling_rate(s.stamps) for s in given.recording.streams}
     return {n: float(np.hypot(v, _INTERPOLATION * steps[n])) if v > 0 else v for n, v in stds.items()}
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap, stamps_of
+from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap
 from steelyard.logs.clock_fit import ROWS, SURE, ClockCourse, Linear, holding, seen, settled, share_left
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Question
@@ -245,8 +245,7 @@ def together(jumps: Iterable[Placed]) -> tuple[Placed, ...]:
 
 
 def _moved(stream: Stream, placed: Placed) -> Stream:
-    time = stamps_of(stream)
-    return replace(stream, time=time - placed.size * (np.arange(len(time)) >= placed.row))
+    return replace(stream, time=stream.stamps - placed.size * (np.arange(len(stream)) >= placed.row))
 
 
 def _placed(streams: Mapping[str, Stream], jumps: Mapping[str, ClockJump], wrench: str) -> dict[str, Placed]:
@@ -256,7 +255,7 @@ def _placed(streams: Mapping[str, Stream], jumps: Mapping[str, ClockJump], wrenc
     for name, jump in jumps.items():
         own = Placed(name, 0, jump.more, jump.more_std, jump.middle, (name,), cut=True)
         for gapped, size, off in ((name, jump.more, jump.late), (wrench, -jump.more, late)):
-            stamps = stamps_of(streams[gapped])
+            stamps = streams[gapped].stamps
             k = jump_gap(stamps, size, jump.middle + off, max(SAME_S, _SAME * abs(size)))
             if k is not None:
                 parted = (*out[gapped].parted, name) if gapped in out else (name,)
@@ -271,6 +270,6 @@ def _without_unsure(stream: Stream, placed: Placed) -> tuple[Stream, Placed]:
     """Return the stream without rows that may be of either side of a jump, and the row it is at then."""
     if not placed.cut:
         return stream, placed
-    late = stamps_of(stream) - placed.at
+    late = stream.stamps - placed.at
     before = late <= -UNSURE_S - max(placed.size, 0.0)
     return stream.rows(before | (late > UNSURE_S)), replace(placed, row=int(before.sum()))

@@ -5,7 +5,7 @@ Streams keep their own clocks and frames; units are SI.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 
 from steelyard import check
 from steelyard.check import Array, Mask, frozen
-from steelyard.errors import BadValue
+from steelyard.errors import BadDescription, BadValue
 from steelyard.findings import Finding
 from steelyard.spatial import Pose, Rotation
 
@@ -114,10 +114,30 @@ class Stream:
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
 
+    @property
+    def stamps(self) -> Array:
+        """Its stamps (N,) [s]; raises BadDescription where it has none."""
+        if self.time is None:
+            raise BadDescription(f"'{self.name}' has no time; streams with their own rows need a clock.")
+        return self.time
+
+    @property
+    def sampled(self) -> Array:
+        """When its rows were sampled (N,) [s]: the stamps less a delay that was given; raises as `stamps` does."""
+        return np.asarray(self.stamps - (self.delay or 0.0))
+
+    def in_world(self, quantity: str) -> bool:
+        """Tell whether a quantity is given in the axes of W, as positions always are, and not in its own."""
+        return quantity == "position" or self.frames.get(quantity, "S") == "W"
+
     def rows(self, kept: Mask) -> Stream:
         """Return the stream of those rows (N,) alone."""
         time = None if self.time is None else frozen(self.time[kept])
         return replace(self, channels={name: frozen(values[kept]) for name, values in self.channels.items()}, time=time)
+
+    def with_channels(self, **channels: Array) -> Stream:
+        """Return the stream with these channels beside or instead of its own."""
+        return replace(self, channels={**self.channels, **channels})
 
     @property
     def turn(self) -> Rotation | None:
@@ -178,6 +198,30 @@ class Recording:
         for stream in streams:
             if not stream.finite:
                 raise BadValue(f"{stream.name}: rows miss numbers (NaN, infinity); sy.recording leaves such rows out.")
+
+    def stream_of(self, *quantities: str) -> Stream | None:
+        """Return the first stream that holds all of the quantities; None where there is none."""
+        return next((s for s in self.streams if set(quantities) <= set(s.channels)), None)
+
+    def channels(self, *quantities: str) -> Iterator[tuple[Stream, str, Array]]:
+        """Yield stream, quantity and values (N, ..) of every channel that holds one of the quantities."""
+        for quantity in quantities:
+            for stream in self.streams:
+                if quantity in stream.channels:
+                    yield stream, quantity, stream.channels[quantity]
+
+    def changed(self, change: Callable[[Stream], Stream]) -> Recording:
+        """Return the recording with its streams as `change` makes them."""
+        return replace(self, streams=tuple(map(change, self.streams)))
+
+    def noted(self, note: str) -> Recording:
+        """Return the recording with one more note."""
+        return replace(self, notes=(*self.notes, note))
+
+
+def no_rotation(quantity: str, stream: str) -> BadDescription:
+    """Return the error about a quantity that a stream gives in W where nothing says how S stood."""
+    return BadDescription(f"{quantity} of '{stream}' is given in W, but no stream gives the rotation of S in W.")
 
 
 def _channel(name: str, quantity: str, values: Any) -> Array:

@@ -13,7 +13,7 @@ from steelyard.findings import Finding
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import first_mount
 from steelyard.logs.log import MotionLog
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.recording import Recording, Stream, no_rotation
 from steelyard.logs.runs import stretches
 from steelyard.spatial import Rotation
 
@@ -79,9 +79,9 @@ def _log_of_rows(found: Found, wrench: Array, gravity: Array, rotation: Rotation
         motion[quantity] = zero
         if quantity in found:
             stream, motion[quantity] = found[quantity]
-            if stream.frames.get(quantity, "S") == "W":
+            if stream.in_world(quantity):
                 if rotation is None:
-                    raise BadDescription(f"{quantity} of '{stream.name}' is given in W, but there is no rotation.")
+                    raise no_rotation(quantity, stream.name)
                 motion[quantity] = rotation.inverse().apply(motion[quantity])
     if motion["linear_acceleration"] is zero and "specific_force" in found:
         stream, values = found["specific_force"]

@@ -17,7 +17,6 @@ from steelyard.sanity.coverage import coverage
 from steelyard.sanity.fitted.biases import Drift
 from steelyard.sanity.fitted.gravity import fitted_gravity
 from steelyard.sanity.fitted.no_body import implausible
-from steelyard.sanity.readings.glance import channel
 
 # chi^2 per degree of freedom above this, and declared noise off by this factor, are far from right.
 CHI2, NOISE_RATIO = 2.5, 2.5
@@ -87,7 +86,7 @@ def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...
         declared = recording.noise.get(quantity)
         if declared is None:
             continue
-        raw = max((_white(s.time, v) for s, _, v in channel(recording, quantity)), default=0.0)
+        raw = max((_white(s.time, v) for s, _, v in recording.channels(quantity)), default=0.0)
         most = float(np.hypot(raw, residuals[quantity]))
         if declared > NOISE_RATIO * most or declared * NOISE_RATIO < raw:
             shown = most if declared > most else raw
@@ -103,7 +102,7 @@ def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...
 
 def row_noise(log: MotionLog, recording: Recording, part: str) -> float:
     """Return the white noise of "force" [N] or "torque" [N m] per axis in the rows of the log; zero for tables."""
-    return max((_passed(log, s.time, v) for s, _, v in channel(recording, part)), default=0.0)
+    return max((_passed(log, s.time, v) for s, _, v in recording.channels(part)), default=0.0)
 
 
 def _passed(log: MotionLog, time: Array | None, values: Array) -> float:
