@@ -161,11 +161,7 @@ def _channels(spec: StreamSpec, table: Table, cells: Columns, gravity: Array) ->
 
 
 def _seconds(
-    specs: Sequence[StreamSpec],
-    tables: Sequence[Table],
-    cells: Sequence[Columns],
-    rows: Sequence[int],
-    gaps: bool,
+    specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Columns], rows: Sequence[int], gaps: bool
 ) -> list[Array | None]:
     """Return seconds after one common origin; a stream with only a rate starts with the earliest clock.
 
