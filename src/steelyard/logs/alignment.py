@@ -11,15 +11,16 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
-from steelyard.logs import clock_jumps, clock_rates
+from steelyard.logs import clock_jumps, clock_rates, jumped_stamps
 from steelyard.logs.bandwidth import rigid_up_to
 from steelyard.logs.clock import sampling_rate
-from steelyard.logs.clock_jumps import ClockJump, Placed
+from steelyard.logs.clock_jumps import ClockJump
 from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Mounting
 from steelyard.logs.joint_fit import refine
+from steelyard.logs.jumped_stamps import Placed
 from steelyard.logs.kinematics import Motion
 from steelyard.logs.log import MotionLog
 from steelyard.logs.noise import classes, levels
@@ -212,7 +213,8 @@ def _steadier(
         return None
     if jumps := clock_jumps.clock_jumps(question, clocks.delays_s):
         recording, placed = _jumps_put_right(given, jumps, clocks.delays_s)
-        return _align_timed(prepared(recording, given.options), unsteady - 1, clock_jumps.together((*jumped, *placed)))
+        jumped = jumped_stamps.together((*jumped, *placed))
+        return _align_timed(prepared(recording, given.options), unsteady - 1, jumped)
     if rates := clock_rates.clock_rates(question, clocks.delays_s):
         right = _align_timed(prepared(clock_rates.put_right(given.recording, rates), given.options), jumped=jumped)
         return replace(right, findings=(*say.rate_findings(rates), *right.findings))
@@ -224,7 +226,7 @@ def _jumps_put_right(
 ) -> tuple[Recording, tuple[Placed, ...]]:
     """Return the recording with clocks put right that jump; sizes are found anew, since motion is smooth then."""
     wrench, late = given.felt.stream, {**delays, **{name: jump.late for name, jump in jumps.items()}}
-    recording, placed = clock_jumps.put_right(given.recording, jumps, wrench)
+    recording, placed = jumped_stamps.put_right(given.recording, jumps, wrench)
     for _ in range(_JUMP_ROUNDS):
         again = prepared(recording, given.options)
         time, felt = _rows(again)
@@ -232,9 +234,9 @@ def _jumps_put_right(
         question = _question(again, time[calm], felt.rows(calm).turned_back(given.options.turn), late)
         if len(question.time) < _FEWEST_ROWS:
             break
-        more = clock_jumps.still_jumping(question, late, placed, wrench)
-        recording = clock_jumps.moved(recording, more)
-        placed = clock_jumps.together((*placed, *more))
+        more = jumped_stamps.still_jumping(question, late, placed, wrench)
+        recording = jumped_stamps.moved(recording, more)
+        placed = jumped_stamps.together((*placed, *more))
     return recording, placed
 
 
@@ -278,9 +280,8 @@ def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Moti
         noise_std(given.wrench(clocks.delays_s)) ** 2 * noise_left(given.cutoff, sampling_rate(given.clock)),
         given.recording.noise, within,
     )  # fmt: skip
-    log = replace(bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise)
-    log = replace(log, dead=np.array(felt.dead))
-    return log, motion
+    pose, dead = pose_numbers(time, still), np.array(felt.dead)
+    return replace(bare, time=time, still=still, pose=pose, noise_class=index, noise=noise, dead=dead), motion
 
 
 def _slow(time: Array, values: Array) -> Array:
