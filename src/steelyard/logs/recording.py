@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -105,11 +105,10 @@ class Stream:
                 raise BadValue(f'{self.name}: the frame of {quantity} must be "S" or "W"; got {frame!r}.')
 
     @cached_property
-    def finite(self) -> bool:
-        """Whether every row holds numbers; a sum that is one shows at once that all do."""
+    def known(self) -> Mask:
+        """Which rows (N,) hold a number everywhere."""
         columns = [*self.channels.values(), *(() if self.time is None else (self.time,))]
-        with np.errstate(over="ignore", invalid="ignore"):
-            return all(np.isfinite(column.sum()) or bool(np.isfinite(column).all()) for column in columns)
+        return reduce(np.logical_and, map(known_rows, columns))
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
@@ -196,7 +195,7 @@ class Recording:
         if self.wrench_sign not in (1, -1):
             raise BadValue(f"wrench_sign must be 1 (on-object) or -1 (on-sensor); got {self.wrench_sign!r}.")
         for stream in streams:
-            if not stream.finite:
+            if not stream.known.all():
                 raise BadValue(f"{stream.name}: rows miss numbers (NaN, infinity); sy.recording leaves such rows out.")
 
     def stream_of(self, *quantities: str) -> Stream | None:
@@ -222,6 +221,14 @@ class Recording:
 def no_rotation(quantity: str, stream: str) -> BadDescription:
     """Return the error about a quantity that a stream gives in W where nothing says how S stood."""
     return BadDescription(f"{quantity} of '{stream}' is given in W, but no stream gives the rotation of S in W.")
+
+
+def known_rows(values: Array) -> Mask:
+    """Return which rows of (N, ..) hold numbers; a sum that is one shows at once that all do."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.isfinite(values.sum()):
+            return np.ones(len(values), np.bool_)
+    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(1))
 
 
 def _channel(name: str, quantity: str, values: Any) -> Array:
