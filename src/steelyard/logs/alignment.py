@@ -264,7 +264,9 @@ def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Moti
     if given.imu is not None and clocks.mounting is not None:
         raw = given.imu.signal.at(time + clocks.delays_s.get(given.imu.name, 0.0))
         own = clocks.mounting.at_sensor(raw, motion.omega, motion.alpha)
-        gravity = gravity if gravity is not None else -_slow(time, own)
+        if gravity is None:
+            # As an accelerometer alone tells it: what it shows below 1 Hz.
+            gravity = -signal(time, own, min(1.0, 0.3 * sampling_rate(time))).at(time)
         acceleration = own + gravity
         arm = float(clocks.mounting.position @ clocks.mounting.position)
         variance, within = given.imu.noise_std**2 + arm * motion.alpha_variance, (within[0], 1.0)
@@ -282,8 +284,3 @@ def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Moti
     )  # fmt: skip
     pose, dead = pose_numbers(time, still), np.array(felt.dead)
     return replace(bare, time=time, still=still, pose=pose, noise_class=index, noise=noise, dead=dead), motion
-
-
-def _slow(time: Array, values: Array) -> Array:
-    """Return `values` (N, 3) below 1 Hz: gravity as an accelerometer alone tells it."""
-    return signal(time, values, min(1.0, 0.3 * sampling_rate(time))).at(time)

@@ -62,14 +62,8 @@ def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
     factor = unit_factor(values, gravity_size)
     curve = signal(stream.stamps, values * factor, cutoff_hz)
     noise = float(np.sqrt((noise_std(values * factor) ** 2).mean() * noise_left(cutoff_hz, curve.rate)))
-    return Imu(
-        stream.name,
-        curve,
-        noise,
-        stream.turn,
-        None if stream.arm is None else np.asarray(stream.arm, dtype=float),
-        factor,
-    )
+    position = None if stream.arm is None else np.asarray(stream.arm, dtype=float)
+    return Imu(stream.name, curve, noise, stream.turn, position, factor)
 
 
 def unit_factor(specific_force: Array, gravity_size: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.curve import Curve
-from steelyard.logs.recording import Stream, no_rotation
+from steelyard.logs.recording import Stream, first_channels, no_rotation
 from steelyard.logs.smoothing import Smooth, smooth, smooth_rotations, turning
 from steelyard.spatial import Rotation, lever_acceleration
 
@@ -190,10 +190,7 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
     Given accelerations are low-passed at `cutoff_hz` [Hz] only; given velocities are smoothed where the acceleration
     must come from them, positions always. Raises BadDescription when W-frame channels come without a rotation.
     """
-    found: dict[str, tuple[Stream, Array]] = {}
-    for stream in streams:
-        for quantity, values in stream.channels.items():
-            found.setdefault(quantity, (stream, values))
+    found = first_channels(streams)
     # Beside a given acceleration a position still tells the velocity, and with it what is at rest.
     smoothed = {"position", *(velocity for velocity, better in _BETTER.items() if better not in found)}
     channels = {q: _channel(*found[q], q, q in smoothed, cutoff_hz) for q in _QUANTITIES if q in found}

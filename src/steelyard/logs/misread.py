@@ -108,17 +108,17 @@ INVERTED = replace(
 )
 MISREAD = (
     TURNED_ROUND,
-    *(
-        Misread(
-            "quaternion-order",
-            f"the four numbers of each quaternion are {order}",
-            None,
-            lambda R, places=places: rolled(R, places),  # type: ignore[misc]
-        )
-        for places, order in (
-            (-1, "in the order x, y, z, w, not w, x, y, z as was said or assumed"),
-            (1, "in the order w, x, y, z, not x, y, z, w as was said or assumed"),
-        )
+    Misread(
+        "quaternion-order",
+        "the four numbers of each quaternion are in the order x, y, z, w, not w, x, y, z as was said or assumed",
+        None,
+        lambda R: rolled(R, -1),
+    ),
+    Misread(
+        "quaternion-order",
+        "the four numbers of each quaternion are in the order w, x, y, z, not x, y, z, w as was said or assumed",
+        None,
+        lambda R: rolled(R, 1),
     ),
     Misread(
         "gravity-frame",

@@ -218,6 +218,11 @@ class Recording:
         return replace(self, notes=(*self.notes, note))
 
 
+def first_channels(streams: Sequence[Stream]) -> dict[str, tuple[Stream, Array]]:
+    """Return quantity -> the first stream that has it, and its values."""
+    return {quantity: (s, values) for s in reversed(streams) for quantity, values in s.channels.items()}
+
+
 def no_rotation(quantity: str, stream: str) -> BadDescription:
     """Return the error about a quantity that a stream gives in W where nothing says how S stood."""
     return BadDescription(f"{quantity} of '{stream}' is given in W, but no stream gives the rotation of S in W.")
