@@ -6,12 +6,4 @@ from steelyard.io.result_files import read_result, result_dict, write_result
 from steelyard.io.team_files import read_team
 from steelyard.io.teams.team_writing import write_team
 
-__all__ = [
-    "read_pendant",
-    "read_recording",
-    "read_result",
-    "read_team",
-    "result_dict",
-    "write_result",
-    "write_team",
-]
+__all__ = ["read_pendant", "read_recording", "read_result", "read_team", "result_dict", "write_result", "write_team"]

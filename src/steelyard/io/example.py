@@ -29,10 +29,7 @@ _NUMBERED = {
     "torque": '{ columns = [4, 5, 6], unit = "N*m" }',
     "rotation": '{ columns = [7, 8, 9, 10], form = "quaternion-wxyz" }   # S to W',
 }
-_ELSE = {
-    "time": ", or leave the line out",
-    "rotation": "; those of another file in a [[stream]] of its own",
-}
+_ELSE = {"time": ", or leave the line out", "rotation": "; those of another file in a [[stream]] of its own"}
 _ATTITUDES = ("rotation", "gravity", "specific_force", "joint_position")
 _FIRST_BEYOND = {"time": 1, "force": 4, "torque": 7, "rotation": 11}
 _ROBOT = """

@@ -59,11 +59,7 @@ def _read(path: Path, data: Path | None) -> Recording:
 
 
 def recording_of(
-    description: Description,
-    tables: Sequence[Table],
-    cells: Sequence[Columns],
-    name: str,
-    arm: SerialArm | None = None,
+    description: Description, tables: Sequence[Table], cells: Sequence[Columns], name: str, arm: SerialArm | None = None
 ) -> Recording:
     """Return the recording that a description makes of its tables, checked, without the tool that it names.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.contents import in_file
-from steelyard.io.tables.array_table import read_arrays
+from steelyard.io.tables.array_table import npz, read_arrays
 from steelyard.logs.log import Integers, Noise
 from steelyard.logs.moments import SIZE, Moments
 from steelyard.whole_files import write_bytes
@@ -26,9 +25,7 @@ def write_moments(moments: Moments, path: Path | str) -> None:
     noise = moments.noise or ()
     variances = (np.reshape([getattr(n, name) for n in noise], (-1, 6)) for name in ("acceleration", "wrench"))
     arrays = (moments.scatter, moments.noise_class, moments.block, moments.still, *variances)
-    content = io.BytesIO()
-    np.savez(content, allow_pickle=False, **dict(zip(_NAMES, arrays, strict=True)))
-    write_bytes(Path(path), content.getvalue())
+    write_bytes(Path(path), npz(dict(zip(_NAMES, arrays, strict=True))))
 
 
 def read_moments(path: Path | str) -> Moments:

@@ -94,11 +94,7 @@ def _part(part: PartMass) -> dict[str, Any]:
 
 def _people(values: Array) -> dict[str, Any]:
     """Return (10,) of mass, com, inertia about the CoM under their names; the inertia as a matrix."""
-    return {
-        "mass_kg": float(values[0]),
-        "com_m": values[1:4],
-        "inertia_com_kgm2": forms.inertia_matrix(values),
-    }
+    return {"mass_kg": float(values[0]), "com_m": values[1:4], "inertia_com_kgm2": forms.inertia_matrix(values)}
 
 
 def _evidence(evidence: Evidence) -> dict[str, Any]:

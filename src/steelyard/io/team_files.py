@@ -184,7 +184,7 @@ def _carrying(streams: Sequence[Stream], time: Array) -> np.ndarray[Any, np.dtyp
             known = np.isfinite(said)
             if not np.isin(said[known], (0.0, 1.0)).all():
                 raise BadValue('"carrying" must be 1 where the robot holds the payload and 0 where it does not.')
-            stamps = stream.time[known] - (stream.delay or 0.0)
+            stamps = stream.sampled[known]
             nearest = np.searchsorted((stamps[1:] + stamps[:-1]) / 2, time)
             return np.asarray(said[known][nearest] == 1)
     return None

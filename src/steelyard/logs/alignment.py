@@ -11,15 +11,16 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
-from steelyard.logs import clock_jumps, clock_rates
+from steelyard.logs import clock_jumps, clock_rates, jumped_stamps
 from steelyard.logs.bandwidth import rigid_up_to
-from steelyard.logs.clock import sampling_rate, stamps_of
-from steelyard.logs.clock_jumps import ClockJump, Placed
+from steelyard.logs.clock import sampling_rate
+from steelyard.logs.clock_jumps import ClockJump
 from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Mounting
 from steelyard.logs.joint_fit import refine
+from steelyard.logs.jumped_stamps import Placed
 from steelyard.logs.kinematics import Motion
 from steelyard.logs.log import MotionLog
 from steelyard.logs.noise import classes, levels
@@ -139,10 +140,8 @@ def _taps(given: Prepared) -> Array:
     # Delays are not known yet: a tap is far quicker than what they turn.
     wrench = given.wrench(given.known)
     found = [bursts(given.clock, part, margin) for part in (wrench[:, :3], wrench[:, 3:])]
-    for stream in given.recording.streams:
-        if "specific_force" in stream.channels and given.imu is not None:
-            late = given.known.get(stream.name, 0.0)
-            found.append(bursts(stamps_of(stream) - late, stream.channels["specific_force"], margin))
+    for stream, _, values in given.recording.channels("specific_force") if given.imu is not None else ():
+        found.append(bursts(stream.stamps - given.known.get(stream.name, 0.0), values, margin))
     return merged(*found)
 
 
@@ -214,7 +213,8 @@ def _steadier(
         return None
     if jumps := clock_jumps.clock_jumps(question, clocks.delays_s):
         recording, placed = _jumps_put_right(given, jumps, clocks.delays_s)
-        return _align_timed(prepared(recording, given.options), unsteady - 1, clock_jumps.together((*jumped, *placed)))
+        jumped = jumped_stamps.together((*jumped, *placed))
+        return _align_timed(prepared(recording, given.options), unsteady - 1, jumped)
     if rates := clock_rates.clock_rates(question, clocks.delays_s):
         right = _align_timed(prepared(clock_rates.put_right(given.recording, rates), given.options), jumped=jumped)
         return replace(right, findings=(*say.rate_findings(rates), *right.findings))
@@ -226,7 +226,7 @@ def _jumps_put_right(
 ) -> tuple[Recording, tuple[Placed, ...]]:
     """Return the recording with clocks put right that jump; sizes are found anew, since motion is smooth then."""
     wrench, late = given.felt.stream, {**delays, **{name: jump.late for name, jump in jumps.items()}}
-    recording, placed = clock_jumps.put_right(given.recording, jumps, wrench)
+    recording, placed = jumped_stamps.put_right(given.recording, jumps, wrench)
     for _ in range(_JUMP_ROUNDS):
         again = prepared(recording, given.options)
         time, felt = _rows(again)
@@ -234,9 +234,9 @@ def _jumps_put_right(
         question = _question(again, time[calm], felt.rows(calm).turned_back(given.options.turn), late)
         if len(question.time) < _FEWEST_ROWS:
             break
-        more = clock_jumps.still_jumping(question, late, placed, wrench)
-        recording = clock_jumps.moved(recording, more)
-        placed = clock_jumps.together((*placed, *more))
+        more = jumped_stamps.still_jumping(question, late, placed, wrench)
+        recording = jumped_stamps.moved(recording, more)
+        placed = jumped_stamps.together((*placed, *more))
     return recording, placed
 
 
@@ -251,7 +251,7 @@ def _rigid(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> float | 
 
 def _with_interpolation(given: Prepared, stds: Mapping[str, float]) -> dict[str, float]:
     """Return standard deviations that allow for interpolation: a hundredth of a stream's step."""
-    steps = {s.name: 1 / sampling_rate(stamps_of(s)) for s in given.recording.streams}
+    steps = {s.name: 1 / sampling_rate(s.stamps) for s in given.recording.streams}
     return {n: float(np.hypot(v, _INTERPOLATION * steps[n])) if v > 0 else v for n, v in stds.items()}
 
 
@@ -264,7 +264,9 @@ def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Moti
     if given.imu is not None and clocks.mounting is not None:
         raw = given.imu.signal.at(time + clocks.delays_s.get(given.imu.name, 0.0))
         own = clocks.mounting.at_sensor(raw, motion.omega, motion.alpha)
-        gravity = gravity if gravity is not None else -_slow(time, own)
+        if gravity is None:
+            # As an accelerometer alone tells it: what it shows below 1 Hz.
+            gravity = -signal(time, own, min(1.0, 0.3 * sampling_rate(time))).at(time)
         acceleration = own + gravity
         arm = float(clocks.mounting.position @ clocks.mounting.position)
         variance, within = given.imu.noise_std**2 + arm * motion.alpha_variance, (within[0], 1.0)
@@ -280,11 +282,5 @@ def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Moti
         noise_std(given.wrench(clocks.delays_s)) ** 2 * noise_left(given.cutoff, sampling_rate(given.clock)),
         given.recording.noise, within,
     )  # fmt: skip
-    log = replace(bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise)
-    log = replace(log, dead=np.array(felt.dead))
-    return log, motion
-
-
-def _slow(time: Array, values: Array) -> Array:
-    """Return `values` (N, 3) below 1 Hz: gravity as an accelerometer alone tells it."""
-    return signal(time, values, min(1.0, 0.3 * sampling_rate(time))).at(time)
+    pose, dead = pose_numbers(time, still), np.array(felt.dead)
+    return replace(bare, time=time, still=still, pose=pose, noise_class=index, noise=noise, dead=dead), motion

@@ -9,11 +9,11 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.clock import UNSURE_S
-from steelyard.logs.clock_jumps import Placed
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Clocks
 from steelyard.logs.holes import holes
 from steelyard.logs.imu import Imu, Mounting
+from steelyard.logs.jumped_stamps import Placed
 from steelyard.logs.recording import Stream
 from steelyard.spatial import Rotation
 

@@ -7,20 +7,12 @@ from numpy.typing import ArrayLike
 
 from steelyard import check
 from steelyard.check import Array
-from steelyard.errors import BadDescription, BadValue
-from steelyard.logs.recording import Stream
+from steelyard.errors import BadValue
 
 # A gap of the stamps is a jump's where it is as long to within so much and so near to where delays change [s].
 SAME_S, NEAR_S = 0.05, 1.0
 # [s] to either side of a jump that leaves no gap, in which rows are left out.
 UNSURE_S = 0.3
-
-
-def stamps_of(stream: Stream) -> Array:
-    """Return the stamps (N,) [s] of a stream; raises BadDescription where it has none."""
-    if stream.time is None:
-        raise BadDescription(f"'{stream.name}' has no time; streams with their own rows need a clock.")
-    return stream.time
 
 
 def seconds(time: ArrayLike) -> Array:

@@ -2,25 +2,22 @@
 
 A look at how late the rows of each stretch seem costs little, and says whether it is worth a search. That tries every
 delay on either side of every time, each side with a linear fit of its own, from moments. What it finds is fitted with
-one body for both sides, and must leave plainly less than one delay, or one that grows steadily, does. The jump is put
-where it leaves a gap in the stamps, else where both delays together fit best.
+one body for both sides, and must leave plainly less than one delay, or one that grows steadily, does.
 Source: own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap, stamps_of
 from steelyard.logs.clock_fit import ROWS, SURE, ClockCourse, Linear, holding, seen, settled, share_left
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Question
 from steelyard.logs.noise import huber
-from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import picked
 
 # A jump is at least so long [s], and leaves less by this factor than one delay does, or one that grows steadily.
@@ -31,8 +28,6 @@ _APART, _LOUD, _STRETCHES, _ENDS = 10.0, 8.0, 60, 4
 # Delays that it tries reach so far [s], and over so much of the log, in steps [s]; by rows, in bins, of which each side
 # has a share.
 _FAR_S, _FAR, _LAG_S, _FEW_ROWS, _BINS, _SIDE = 1.2, 0.1, 0.02, 1500, 40, 0.15
-# A jump is first good to so much of itself: what smooths the motion goes across it.
-_SAME = 0.15
 # Standard deviations beyond which a row counts as so far off.
 _FAR_OFF = 10.0
 
@@ -179,98 +174,3 @@ def _sure(question: Question, start: Mapping[str, ClockJump], found: Mapping[str
     if not share_left(question, settled(question, growing, growing), found) < 1 / BETTER:
         return {}
     return holding(question, found, found, sure)
-
-
-@dataclass(frozen=True)
-class Placed:
-    """Stamps of `name` that were put right by `size` [s] from `row` on.
-
-    at      [s] on the wrench's clock, where it was not put right
-    std     standard deviation [s] of the size
-    parted  the streams beside whose clock, or whose own clock, this one jumps
-    cut     rows to either side were left out, since no gap shows where the jump is
-    """
-
-    name: str
-    row: int
-    size: float
-    std: float
-    at: float
-    parted: tuple[str, ...]
-    cut: bool
-
-
-def put_right(
-    recording: Recording, jumps: Mapping[str, ClockJump], wrench: str
-) -> tuple[Recording, tuple[Placed, ...]]:
-    """Return the recording with stamps put right from the jumps on, and where that is; `wrench` is its stream."""
-    placed = _placed({s.name: s for s in recording.streams}, jumps, wrench)
-    streams = {s.name: _without_unsure(s, placed[s.name]) for s in recording.streams if s.name in placed}
-    recording = replace(recording, streams=tuple(streams.get(s.name, (s,))[0] for s in recording.streams))
-    found = tuple(row for _, row in streams.values())
-    return moved(recording, found), found
-
-
-def moved(recording: Recording, placed: Iterable[Placed]) -> Recording:
-    """Return the recording with stamps earlier by the sizes from the rows on."""
-    by = {p.name: p for p in placed}
-    streams = tuple(_moved(s, by[s.name]) if s.name in by else s for s in recording.streams)
-    return replace(recording, streams=streams)
-
-
-def still_jumping(
-    question: Question, delays: Mapping[str, float], placed: Iterable[Placed], wrench: str
-) -> tuple[Placed, ...]:
-    """Return what is left of jumps that were put right."""
-    every = question.thinned(ROWS)
-    out = []
-    for jump in placed:
-        start = {n: ClockJump(delays[n], 0.0, jump.at) for n in question.others}
-        found = settled(every, start, start)
-        left = found[jump.parted[0]]
-        out.append(replace(jump, size=-left.more if jump.name == wrench else left.more, std=left.more_std))
-    return tuple(out)
-
-
-def together(jumps: Iterable[Placed]) -> tuple[Placed, ...]:
-    """Return the jumps, those of one clock at one time as one; what was found last is known as well as it."""
-    out: list[Placed] = []
-    for jump in jumps:
-        same = next((k for k, p in enumerate(out) if p.name == jump.name and abs(p.at - jump.at) < NEAR_S), None)
-        if same is None:
-            out.append(jump)
-        else:
-            out[same] = replace(out[same], size=out[same].size + jump.size, std=jump.std)
-    return tuple(out)
-
-
-def _moved(stream: Stream, placed: Placed) -> Stream:
-    time = stamps_of(stream)
-    return replace(stream, time=time - placed.size * (np.arange(len(time)) >= placed.row))
-
-
-def _placed(streams: Mapping[str, Stream], jumps: Mapping[str, ClockJump], wrench: str) -> dict[str, Placed]:
-    """Return which stamps jump, by stream: those that a gap shows, of a stream or of the wrench, else the stream's."""
-    out: dict[str, Placed] = {}
-    late = streams[wrench].delay or 0.0
-    for name, jump in jumps.items():
-        own = Placed(name, 0, jump.more, jump.more_std, jump.middle, (name,), cut=True)
-        for gapped, size, off in ((name, jump.more, jump.late), (wrench, -jump.more, late)):
-            stamps = stamps_of(streams[gapped])
-            k = jump_gap(stamps, size, jump.middle + off, max(SAME_S, _SAME * abs(size)))
-            if k is not None:
-                parted = (*out[gapped].parted, name) if gapped in out else (name,)
-                at = float(stamps[k]) - off
-                own = replace(own, name=gapped, row=k + 1, size=size, at=at, parted=parted, cut=False)
-                break
-        out[own.name] = own
-    return out
-
-
-def _without_unsure(stream: Stream, placed: Placed) -> tuple[Stream, Placed]:
-    """Return the stream without rows that may be of either side of a jump, and the row it is at then."""
-    if not placed.cut:
-        return stream, placed
-    late = stamps_of(stream) - placed.at
-    before = late <= -UNSURE_S - max(placed.size, 0.0)
-    return stream.rows(before | (late > UNSURE_S)), replace(placed, row=int(before.sum()))

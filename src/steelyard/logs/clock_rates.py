@@ -73,8 +73,4 @@ def clock_rates(question: Question, delays: Mapping[str, float]) -> dict[str, Cl
 
 def put_right(recording: Recording, rates: Mapping[str, ClockRate]) -> Recording:
     """Return the recording with the stamps of these streams put right; they stay as late as they begin."""
-    streams = tuple(
-        replace(s, time=rates[s.name].right(s.time)) if s.name in rates and s.time is not None else s
-        for s in recording.streams
-    )
-    return replace(recording, streams=streams)
+    return recording.changed(lambda s: replace(s, time=rates[s.name].right(s.stamps)) if s.name in rates else s)

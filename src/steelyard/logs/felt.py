@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadDescription
 from steelyard.logs.log import Integers, Mask
-from steelyard.logs.recording import Stream
+from steelyard.logs.recording import Stream, no_rotation
 from steelyard.spatial import Rotation
 
 _PARTS = ("torque", "force")
@@ -35,7 +34,7 @@ class Felt:
     @classmethod
     def of(cls, stream: Stream, sign: int, dead: tuple[bool, ...] = (False,) * 6) -> Felt:
         """Return the wrench of a stream; `sign` +1 where it is on the object, -1 on the sensor."""
-        world = frozenset(part for part in _PARTS if stream.frames.get(part, "S") == "W")
+        world = frozenset(filter(stream.in_world, _PARTS))
         parts = [stream.channels[part] for part in _PARTS]
         if stream.turn is not None:
             parts = [v if part in world else stream.turn.apply(v) for part, v in zip(_PARTS, parts, strict=True)]
@@ -63,8 +62,7 @@ class Felt:
         torque, force = self.values[:, :3], self.values[:, 3:]
         if self.world:
             if rotation is None:
-                part = next(p for p in _PARTS if p in self.world)
-                raise BadDescription(f"{part} of '{self.stream}' is given in W, but no stream gives the rotation.")
+                raise no_rotation(next(p for p in _PARTS if p in self.world), self.stream)
             back = rotation.inverse()
             torque = back.apply(torque) if "torque" in self.world else torque
             force = back.apply(force) if "force" in self.world else force

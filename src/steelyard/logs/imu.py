@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.clock import stamps_of
 from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.curve import Curve
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
@@ -59,18 +58,12 @@ class Mounting:
 
 def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
     """Return the accelerometer of a timed stream; numbers that are plainly in g are turned into m/s^2."""
-    values, time = stream.channels["specific_force"], stamps_of(stream)
+    values = stream.channels["specific_force"]
     factor = unit_factor(values, gravity_size)
-    curve = signal(time, values * factor, cutoff_hz)
+    curve = signal(stream.stamps, values * factor, cutoff_hz)
     noise = float(np.sqrt((noise_std(values * factor) ** 2).mean() * noise_left(cutoff_hz, curve.rate)))
-    return Imu(
-        stream.name,
-        curve,
-        noise,
-        stream.turn,
-        None if stream.arm is None else np.asarray(stream.arm, dtype=float),
-        factor,
-    )
+    position = None if stream.arm is None else np.asarray(stream.arm, dtype=float)
+    return Imu(stream.name, curve, noise, stream.turn, position, factor)
 
 
 def unit_factor(specific_force: Array, gravity_size: float) -> float:

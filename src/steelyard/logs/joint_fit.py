@@ -22,8 +22,10 @@ _ROUNDS = 4
 _STEPS = 12
 # One scale serves all axes of an accelerometer, whose gains differ by about this much whatever the log shows.
 _GAIN = 0.003
-_PRIOR = {"delay": 0.1, "rotation": 0.5, "position": 0.3, "bias": 1.0, "scale": 0.01, "centre": 0.5}
-_PRIOR_BODY = np.array([30.0, 3, 3, 3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3])
+_PRIOR: dict[str, float | list[float]] = {
+    "delay": 0.1, "rotation": 0.5, "position": 0.3, "bias": 1.0, "scale": 0.01, "centre": 0.5,
+    "body": [30.0, 3, 3, 3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3], "wrench_bias": 1e3,
+}  # fmt: skip
 _STEP = 1e-4
 _LONGEST_STEP = 0.01  # [s] a delay may move at once
 _FINEST = 1e-4  # of a channel's spread: no residual is trusted below
@@ -45,30 +47,17 @@ class _Layout:
 
     @classmethod
     def of(cls, question: Question, delays: Mapping[str, float], mount: Rotation | None, centre: bool) -> _Layout:
-        names, start, width = [], [], []
-
-        def add(name: str, value: Array, spread: Array) -> None:
-            names.append((name, len(value)))
-            start.append(value)
-            width.append(spread)
-
-        n = len(question.unknown)
-        add("delay", np.array([delays[s] for s in question.unknown]), np.full(n, _PRIOR["delay"]))
-        imu = question.imu
+        imu, blocks = question.imu, {"delay": np.array([delays[s] for s in question.unknown])}
         if imu is not None:
-            if imu.rotation is None:
-                add("rotation", np.zeros(3), np.full(3, _PRIOR["rotation"]))
-            if imu.position is None:
-                add("position", np.zeros(3), np.full(3, _PRIOR["position"]))
-            add("bias", np.zeros(3), np.full(3, _PRIOR["bias"]))
-            add("scale", np.ones(1), np.full(1, _PRIOR["scale"]))
-            if centre:
-                add("centre", np.zeros(3), np.full(3, _PRIOR["centre"]))
-        add("body", np.zeros(10), _PRIOR_BODY)
-        add("wrench_bias", question.seen(delays)[1].mean(0), np.full(6, 1e3))
-        ends = np.cumsum([k for _, k in names])
-        slices = {name: slice(int(e) - k, int(e)) for (name, k), e in zip(names, ends, strict=True)}
-        return cls(question, slices, np.concatenate(start), np.concatenate(width), mount)
+            blocks |= {"rotation": np.zeros(3)} if imu.rotation is None else {}
+            blocks |= {"position": np.zeros(3)} if imu.position is None else {}
+            blocks |= {"bias": np.zeros(3), "scale": np.ones(1)}
+            blocks |= {"centre": np.zeros(3)} if centre else {}
+        blocks |= {"body": np.zeros(10), "wrench_bias": question.seen(delays)[1].mean(0)}
+        ends = np.cumsum([len(block) for block in blocks.values()])
+        slices = {name: slice(int(e) - len(blocks[name]), int(e)) for name, e in zip(blocks, ends, strict=True)}
+        width = np.concatenate([np.broadcast_to(_PRIOR[name], len(block)) for name, block in blocks.items()])
+        return cls(question, slices, np.concatenate(list(blocks.values())), width, mount)
 
     def held(self, *names: str) -> _Layout:
         """Return the layout with these blocks held where they start."""

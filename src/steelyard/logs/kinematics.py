@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadDescription
-from steelyard.logs.clock import stamps_of
 from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.curve import Curve
-from steelyard.logs.recording import Stream
+from steelyard.logs.recording import Stream, first_channels, no_rotation
 from steelyard.logs.smoothing import Smooth, smooth, smooth_rotations, turning
 from steelyard.spatial import Rotation, lever_acceleration
 
@@ -192,18 +190,13 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
     Given accelerations are low-passed at `cutoff_hz` [Hz] only; given velocities are smoothed where the acceleration
     must come from them, positions always. Raises BadDescription when W-frame channels come without a rotation.
     """
-    found: dict[str, tuple[Stream, Array]] = {}
-    for stream in streams:
-        for quantity, values in stream.channels.items():
-            found.setdefault(quantity, (stream, values))
+    found = first_channels(streams)
     # Beside a given acceleration a position still tells the velocity, and with it what is at rest.
     smoothed = {"position", *(velocity for velocity, better in _BETTER.items() if better not in found)}
     channels = {q: _channel(*found[q], q, q in smoothed, cutoff_hz) for q in _QUANTITIES if q in found}
     for quantity, channel in channels.items():
         if channel.world and "rotation" not in channels and quantity != "position":
-            raise BadDescription(
-                f"{quantity} of '{channel.stream}' is given in W, but no stream gives the rotation of S in W."
-            )
+            raise no_rotation(quantity, channel.stream)
     spans = {s.name: (float(s.time[0]), float(s.time[-1])) for s in streams if s.time is not None}
     for channel in channels.values():
         start, end = spans[channel.stream]
@@ -213,10 +206,10 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
 
 def _channel(stream: Stream, values: Array, quantity: str, smoothed: bool, cutoff_hz: float | None) -> Channel:
     """Return one quantity of a timed stream as a curve, smoothed or low-passed alone."""
-    time = stamps_of(stream)
+    time = stream.stamps
     if quantity == "rotation":
         return Channel(stream.name, smooth_rotations(time, Rotation.nearest(values), cutoff_hz), False)
-    world = quantity == "position" or stream.frames.get(quantity, "S") == "W"
+    world = stream.in_world(quantity)
     if smoothed:
         return Channel(stream.name, smooth(time, values, cutoff_hz=cutoff_hz), world)
     curve = signal(time, values, cutoff_hz)

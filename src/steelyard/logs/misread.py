@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.findings import Finding
+from steelyard.logs.two_states import cheapest_path
 from steelyard.spatial import Rotation
 
 # Rotation vectors are no longer than the first [rad], but for rounding; one that is costs as much as so many leaps.
@@ -91,23 +91,7 @@ def _smoothest(rotation: Array, cost: Array) -> Integers:
     steps = np.arccos(np.clip((traces - 1) / 2, -1.0, 1.0))
     least = steps.reshape(-1, 4).min(1)
     leaps = steps > LEAP * np.quantile(least, 0.9) + LEAST_LEAP if rows > 1 else steps > np.inf
-    return _cheapest(leaps.astype(np.float64), cost)
-
-
-@numba.njit(cache=True)
-def _cheapest(step: Array, cost: Array) -> Integers:
-    """Return which of two to take of each row (N,), at costs (N, 2) and those of a step (N - 1, 2, 2) from a to b."""
-    rows = len(cost)
-    came, path, total = np.zeros((rows, 2), np.int64), np.zeros(rows, np.int64), cost[:1].copy().reshape(-1)
-    for k in range(1, rows):
-        one, other = total + step[k - 1, :, 0], total + step[k - 1, :, 1]
-        came[k, 0], came[k, 1] = int(one[1] < one[0]), int(other[1] < other[0])
-        total[0], total[1] = min(one[0], one[1]) + cost[k, 0], min(other[0], other[1]) + cost[k, 1]
-    if rows:
-        path[rows - 1] = int(total[1] < total[0])
-    for k in range(rows - 1, 0, -1):
-        path[k - 1] = came[k, path[k]]
-    return path
+    return cheapest_path(leaps.astype(np.float64), cost)
 
 
 def _angles(rotation: Array) -> Array:
@@ -124,17 +108,17 @@ INVERTED = replace(
 )
 MISREAD = (
     TURNED_ROUND,
-    *(
-        Misread(
-            "quaternion-order",
-            f"the four numbers of each quaternion are {order}",
-            None,
-            lambda R, places=places: rolled(R, places),  # type: ignore[misc]
-        )
-        for places, order in (
-            (-1, "in the order x, y, z, w, not w, x, y, z as was said or assumed"),
-            (1, "in the order w, x, y, z, not x, y, z, w as was said or assumed"),
-        )
+    Misread(
+        "quaternion-order",
+        "the four numbers of each quaternion are in the order x, y, z, w, not w, x, y, z as was said or assumed",
+        None,
+        lambda R: rolled(R, -1),
+    ),
+    Misread(
+        "quaternion-order",
+        "the four numbers of each quaternion are in the order w, x, y, z, not x, y, z, w as was said or assumed",
+        None,
+        lambda R: rolled(R, 1),
     ),
     Misread(
         "gravity-frame",

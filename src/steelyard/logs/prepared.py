@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription
-from steelyard.logs.clock import sampling_rate, stamps_of
+from steelyard.logs.clock import sampling_rate
 from steelyard.logs.felt import Felt
 from steelyard.logs.holes import unknown_motion
 from steelyard.logs.imu import Imu, imu
@@ -92,10 +92,9 @@ class Prepared:
 def prepared(recording: Recording, options: AlignOptions) -> Prepared:
     """Smooth the motion and low-pass the rest."""
     source = _wrench_stream(recording)
-    lag = source.delay or 0.0
-    streams = tuple(replace(s, time=stamps_of(s) - lag, delay=0.0) if s is source else s for s in recording.streams)
-    wrench_stream = next(s for s in streams if s.name == source.name and "force" in s.channels)
-    cutoff = _cutoff(streams, wrench_stream, options)
+    wrench = replace(source, time=source.sampled, delay=0.0)
+    streams = tuple(wrench if s is source else s for s in recording.streams)
+    cutoff = _cutoff(streams, wrench, options)
     moving = replace(kinematics(streams, recording.gravity, cutoff), place=np.array(options.place))
     feeling = next((s for s in streams if "specific_force" in s.channels), None)
     sensor = None
@@ -107,23 +106,21 @@ def prepared(recording: Recording, options: AlignOptions) -> Prepared:
     given = {s.name: s.delay for s in recording.streams}
     sought = [s.name for s in clocks if options.estimate_delays and given[s.name] is None]
     known = {s.name: s.delay or 0.0 for s in clocks if s.name not in sought}
-    felt = Felt.of(wrench_stream, recording.wrench_sign, recording.dead)
+    felt = Felt.of(wrench, recording.wrench_sign, recording.dead)
     # A low-pass smears what a smoother makes of a hole over its surroundings.
     smeared = 0.0 if cutoff is None else SMEARED / cutoff
     wider = np.array([-smeared, smeared])
     unseen = {s.name: unknown_motion(s) + wider for s in streams if s.name in seen}
-    return Prepared(
-        recording, options, stamps_of(wrench_stream), felt, cutoff, moving, sensor, known, tuple(sought), unseen
-    )  # fmt: skip
+    return Prepared(recording, options, wrench.stamps, felt, cutoff, moving, sensor, known, tuple(sought), unseen)
 
 
 def _wrench_stream(recording: Recording) -> Stream:
-    for stream in recording.streams:
-        if "force" in stream.channels:
-            if "torque" not in stream.channels:
-                raise BadDescription(f"'{stream.name}' has force but no torque; give both in one stream.")
-            return stream
-    raise BadDescription("no stream has force; a log needs force and torque.")
+    stream = recording.stream_of("force")
+    if stream is None:
+        raise BadDescription("no stream has force; a log needs force and torque.")
+    if "torque" not in stream.channels:
+        raise BadDescription(f"'{stream.name}' has force but no torque; give both in one stream.")
+    return stream
 
 
 def _cutoff(streams: tuple[Stream, ...], wrench: Stream, options: AlignOptions) -> float | None:
@@ -131,7 +128,7 @@ def _cutoff(streams: tuple[Stream, ...], wrench: Stream, options: AlignOptions) 
     given = {"linear_acceleration", "angular_acceleration"}
     if len(streams) == 1 and given <= set(wrench.channels):
         return None
-    rates = {s.name: sampling_rate(stamps_of(s)) for s in streams if s is not wrench}
+    rates = {s.name: sampling_rate(s.stamps) for s in streams if s is not wrench}
     feeling = [rates[s.name] for s in streams if "specific_force" in s.channels and s is not wrench]
-    rate = min(sampling_rate(stamps_of(wrench)), feeling[0] if feeling else max(rates.values(), default=np.inf))
+    rate = min(sampling_rate(wrench.stamps), feeling[0] if feeling else max(rates.values(), default=np.inf))
     return min(options.cutoff_hz, 0.4 * rate)

@@ -5,16 +5,16 @@ Streams keep their own clocks and frames; units are SI.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
 
 from steelyard import check
 from steelyard.check import Array, Mask, frozen
-from steelyard.errors import BadValue
+from steelyard.errors import BadDescription, BadValue
 from steelyard.findings import Finding
 from steelyard.spatial import Pose, Rotation
 
@@ -105,19 +105,38 @@ class Stream:
                 raise BadValue(f'{self.name}: the frame of {quantity} must be "S" or "W"; got {frame!r}.')
 
     @cached_property
-    def finite(self) -> bool:
-        """Whether every row holds numbers; a sum that is one shows at once that all do."""
+    def known(self) -> Mask:
+        """Which rows (N,) hold a number everywhere."""
         columns = [*self.channels.values(), *(() if self.time is None else (self.time,))]
-        with np.errstate(over="ignore", invalid="ignore"):
-            return all(np.isfinite(column.sum()) or bool(np.isfinite(column).all()) for column in columns)
+        return reduce(np.logical_and, map(known_rows, columns))
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
+
+    @property
+    def stamps(self) -> Array:
+        """Its stamps (N,) [s]; raises BadDescription where it has none."""
+        if self.time is None:
+            raise BadDescription(f"'{self.name}' has no time; streams with their own rows need a clock.")
+        return self.time
+
+    @property
+    def sampled(self) -> Array:
+        """When its rows were sampled (N,) [s]: the stamps less a delay that was given; raises as `stamps` does."""
+        return np.asarray(self.stamps - (self.delay or 0.0))
+
+    def in_world(self, quantity: str) -> bool:
+        """Tell whether a quantity is given in the axes of W, as positions always are, and not in its own."""
+        return quantity == "position" or self.frames.get(quantity, "S") == "W"
 
     def rows(self, kept: Mask) -> Stream:
         """Return the stream of those rows (N,) alone."""
         time = None if self.time is None else frozen(self.time[kept])
         return replace(self, channels={name: frozen(values[kept]) for name, values in self.channels.items()}, time=time)
+
+    def with_channels(self, **channels: Array) -> Stream:
+        """Return the stream with these channels beside or instead of its own."""
+        return replace(self, channels={**self.channels, **channels})
 
     @property
     def turn(self) -> Rotation | None:
@@ -176,8 +195,45 @@ class Recording:
         if self.wrench_sign not in (1, -1):
             raise BadValue(f"wrench_sign must be 1 (on-object) or -1 (on-sensor); got {self.wrench_sign!r}.")
         for stream in streams:
-            if not stream.finite:
+            if not stream.known.all():
                 raise BadValue(f"{stream.name}: rows miss numbers (NaN, infinity); sy.recording leaves such rows out.")
+
+    def stream_of(self, *quantities: str) -> Stream | None:
+        """Return the first stream that holds all of the quantities; None where there is none."""
+        return next((s for s in self.streams if set(quantities) <= set(s.channels)), None)
+
+    def channels(self, *quantities: str) -> Iterator[tuple[Stream, str, Array]]:
+        """Yield stream, quantity and values (N, ..) of every channel that holds one of the quantities."""
+        for quantity in quantities:
+            for stream in self.streams:
+                if quantity in stream.channels:
+                    yield stream, quantity, stream.channels[quantity]
+
+    def changed(self, change: Callable[[Stream], Stream]) -> Recording:
+        """Return the recording with its streams as `change` makes them."""
+        return replace(self, streams=tuple(map(change, self.streams)))
+
+    def noted(self, note: str) -> Recording:
+        """Return the recording with one more note."""
+        return replace(self, notes=(*self.notes, note))
+
+
+def first_channels(streams: Sequence[Stream]) -> dict[str, tuple[Stream, Array]]:
+    """Return quantity -> the first stream that has it, and its values."""
+    return {quantity: (s, values) for s in reversed(streams) for quantity, values in s.channels.items()}
+
+
+def no_rotation(quantity: str, stream: str) -> BadDescription:
+    """Return the error about a quantity that a stream gives in W where nothing says how S stood."""
+    return BadDescription(f"{quantity} of '{stream}' is given in W, but no stream gives the rotation of S in W.")
+
+
+def known_rows(values: Array) -> Mask:
+    """Return which rows of (N, ..) hold numbers; a sum that is one shows at once that all do."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.isfinite(values.sum()):
+            return np.ones(len(values), np.bool_)
+    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(1))
 
 
 def _channel(name: str, quantity: str, values: Any) -> Array:

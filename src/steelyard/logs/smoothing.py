@@ -86,7 +86,8 @@ def smooth(time: Array, values: Array, noise_dof: int | None = None, cutoff_hz: 
     _, order, ratio = min(_best_ratio(clock, centred, n) for n in _ORDERS)
     scale = ratio ** (1 / (2 * order))
     floor = (_NOISE_FLOOR * (np.ptp(y, axis=0).max() + 1e-12)) ** 2
-    states, cov, quad, _, count = _smooth_kernel(clock * scale, centred, order, scale)
+    *forward, quad, _, count = _forward(clock * scale, centred, _model(order), scale, True)
+    states, cov = _backward(*forward)
     noise = max(quad / max(count * y.shape[1] * share, 1.0), floor)
     back = (scale / step) ** np.arange(order)
     bandwidth = scale / (2 * np.pi * step)
@@ -236,12 +237,6 @@ def _model(order: int) -> tuple[Array, Array]:
             a, b = order - 1 - i, order - 1 - j
             Q[i, j] = 1 / (factorial(a) * factorial(b) * (a + b + 1))
     return F, Q
-
-
-def _smooth_kernel(clock: Array, values: Array, order: int, density: float) -> tuple[Any, ...]:
-    """Run both passes; return smoothed states, covariances, innovation energy, log-determinant and count."""
-    forward = _forward(clock, values, _model(order), density, True)
-    return *_backward(*forward[:5]), *forward[5:]
 
 
 @njit(cache=True)

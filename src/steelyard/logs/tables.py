@@ -13,7 +13,7 @@ from steelyard.findings import Finding
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import first_mount
 from steelyard.logs.log import MotionLog
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.recording import Recording, Stream, first_channels, no_rotation
 from steelyard.logs.runs import stretches
 from steelyard.spatial import Rotation
 
@@ -36,7 +36,7 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"'{n}' has {k}" for n, k in lengths.items())
         raise BadDescription(f"streams without time are matched by row, so they need one length; {shown} rows.")
-    found = {q: (s, v) for s in reversed(streams) for q, v in s.channels.items()}
+    found = first_channels(streams)
     if "force" not in found or "torque" not in found:
         raise BadDescription("a log needs force and torque.")
     rotation = Rotation.nearest(found["rotation"][1]) if "rotation" in found else None
@@ -79,9 +79,9 @@ def _log_of_rows(found: Found, wrench: Array, gravity: Array, rotation: Rotation
         motion[quantity] = zero
         if quantity in found:
             stream, motion[quantity] = found[quantity]
-            if stream.frames.get(quantity, "S") == "W":
+            if stream.in_world(quantity):
                 if rotation is None:
-                    raise BadDescription(f"{quantity} of '{stream.name}' is given in W, but there is no rotation.")
+                    raise no_rotation(quantity, stream.name)
                 motion[quantity] = rotation.inverse().apply(motion[quantity])
     if motion["linear_acceleration"] is zero and "specific_force" in found:
         stream, values = found["specific_force"]

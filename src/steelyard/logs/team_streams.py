@@ -58,7 +58,7 @@ def in_grasp_axes(streams: Sequence[Stream], channels: Mapping[str, Array]) -> d
         for name in stream.channels:
             if name not in out:
                 continue
-            if stream.frames.get(name) == "W" and name != "position":
+            if stream.in_world(name) and name != "position":
                 if "rotation" not in out:
                     raise BadValue(f'{stream.name}: {name} with frame = "W" needs the rotation of the grasp.')
                 out[name] = np.einsum("tji,tj->ti", out["rotation"], out[name])
@@ -73,7 +73,7 @@ def in_grasp_axes(streams: Sequence[Stream], channels: Mapping[str, Array]) -> d
 def _clock(stream: Stream) -> Array:
     if stream.time is None:
         raise BadValue(f"{stream.name}: a stream of a team needs time.")
-    return stream.time - (stream.delay or 0.0)
+    return stream.sampled
 
 
 def _turns_at(own: Array, values: Array, time: Array) -> Array:

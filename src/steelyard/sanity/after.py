@@ -17,7 +17,6 @@ from steelyard.sanity.coverage import coverage
 from steelyard.sanity.fitted.biases import Drift
 from steelyard.sanity.fitted.gravity import fitted_gravity
 from steelyard.sanity.fitted.no_body import implausible
-from steelyard.sanity.readings.glance import channel
 
 # chi^2 per degree of freedom above this, and declared noise off by this factor, are far from right.
 CHI2, NOISE_RATIO = 2.5, 2.5
@@ -87,7 +86,7 @@ def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...
         declared = recording.noise.get(quantity)
         if declared is None:
             continue
-        raw = max((_white(s.time, v) for s, _, v in channel(recording, quantity)), default=0.0)
+        raw = max((_white(v) for s, _, v in recording.channels(quantity) if s.time is not None), default=0.0)
         most = float(np.hypot(raw, residuals[quantity]))
         if declared > NOISE_RATIO * most or declared * NOISE_RATIO < raw:
             shown = most if declared > most else raw
@@ -103,20 +102,16 @@ def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...
 
 def row_noise(log: MotionLog, recording: Recording, part: str) -> float:
     """Return the white noise of "force" [N] or "torque" [N m] per axis in the rows of the log; zero for tables."""
-    return max((_passed(log, s.time, v) for s, _, v in channel(recording, part)), default=0.0)
-
-
-def _passed(log: MotionLog, time: Array | None, values: Array) -> float:
-    """Return the white noise of a timed channel per axis that the low-pass leaves in the rows; zero for tables."""
-    if time is None or log.time is None or len(log) < 2:
+    if log.time is None or len(log) < 2:
         return 0.0
-    share = PASSED * (median_step(time) / median_step(log.time))
-    return _white(time, values) * float(np.sqrt(min(1.0, share)))
+    step = median_step(log.time)
+    timed = ((s.time, v) for s, _, v in recording.channels(part) if s.time is not None)
+    return max((_white(v) * float(np.sqrt(min(1.0, PASSED * (median_step(t) / step)))) for t, v in timed), default=0.0)
 
 
-def _white(time: Array | None, values: Array) -> float:
-    """Return the white noise of a timed channel per axis; zero for tables."""
-    return 0.0 if time is None else float(np.sqrt((noise_std(values) ** 2).mean()))
+def _white(values: Array) -> float:
+    """Return the white noise of a timed channel per axis."""
+    return float(np.sqrt((noise_std(values) ** 2).mean()))
 
 
 def _prior(estimate: Estimate) -> tuple[Finding, ...]:

@@ -59,7 +59,7 @@ def without_zero_torque(recording: Recording) -> Recording:
 
     Raises CannotAnswer for tables at rest, whose forces tell the mass alone.
     """
-    torques = [stream.channels["torque"] for stream in recording.streams if "torque" in stream.channels]
+    torques = [values for _, _, values in recording.channels("torque")]
     if not torques or any(values.any() for values in torques):
         return recording
     if all(stream.poses for stream in recording.streams):
@@ -68,4 +68,4 @@ def without_zero_torque(recording: Recording) -> Recording:
             "quick moves, in which the force shows it."
         )
     note = f"{_UNTOLD}: it is told by how the force follows the moves"
-    return replace(recording, dead=(True, True, True, *recording.dead[3:]), notes=(*recording.notes, note))
+    return replace(recording, dead=(True, True, True, *recording.dead[3:])).noted(note)

@@ -14,7 +14,6 @@ from steelyard.sanity.fitted.full_fit import force_left
 from steelyard.sanity.fitted.misplaced import misplaced
 from steelyard.sanity.fitted.sensor_matrix import in_world, sensor_matrix
 from steelyard.sanity.holding.contact import untouched
-from steelyard.sanity.readings.glance import stream_of
 
 # A hand passes for a sensor that is turned or unlike: put right, one body leaves then more of the forces than this many
 # times what it leaves of the time without the hand.
@@ -45,7 +44,7 @@ def _put_right(log: MotionLog, recording: Recording, drift: bool) -> MotionLog:
 
     A point where only a wrong unit or sign puts it serves as well: with it, one body explains all rows.
     """
-    stream, sensor = stream_of(recording, "force"), sensor_matrix(log, drift)
+    stream, sensor = recording.stream_of("force"), sensor_matrix(log, drift)
     turns = stream is not None and not in_world(stream)
     if sensor is not None and (sensor.unlike or (turns and sensor.turned)):
         log = sensor.put_right(log)

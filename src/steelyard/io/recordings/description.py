@@ -104,11 +104,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
         raise top.error(f"no [[stream]] is given, so there are no data. A complete description:\n{EXAMPLE}")
     _require_arm_for_joints(found["streams"], found["arm"])
     told = "gravity" in log or measures_gravity(found["streams"])
-    return Description(
-        **found,
-        notes=() if told else (LEVEL_BASE,),
-        gravity_std=0.0 if told else ASSUMED_GRAVITY_STD,
-    )
+    return Description(**found, notes=() if told else (LEVEL_BASE,), gravity_std=0.0 if told else ASSUMED_GRAVITY_STD)
 
 
 def _gravity(log: Entry) -> Array:

@@ -19,11 +19,7 @@ from steelyard.io.recordings.description import ASSUMED, Description, default_gr
 from steelyard.io.recordings.not_told import cannot_tell, left_out, numbered_lines, own_lines, require_told
 from steelyard.io.streams.channels import channel_with_gaps, stand_apart
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
-from steelyard.io.streams.usual_names import (
-    STEMS,
-    Names,
-    compared,
-)
+from steelyard.io.streams.usual_names import STEMS, Names, compared
 from steelyard.io.tables.files import Columns, Table
 from steelyard.io.units import SLOWEST, UNITS, converted, median_size, stamp_unit, unit_by_size
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD

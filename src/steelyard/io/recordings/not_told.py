@@ -8,10 +8,7 @@ from steelyard.errors import NoDescription
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
 from steelyard.io.recordings.counted import joints, open_pose, open_quaternion, values
-from steelyard.io.streams.usual_names import (
-    ANGLES,
-    Names,
-)
+from steelyard.io.streams.usual_names import ANGLES, Names
 from steelyard.io.tables.files import Table
 from steelyard.io.units import ANGLE, SLOWEST, UNITS, angle_unit, length_unit, stamp_unit
 

@@ -16,7 +16,7 @@ from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io.entries import listed
 from steelyard.io.streams.channels import channel_with_gaps, require_one_length
-from steelyard.io.streams.clocks import Clock, common_origin, one_column, steady
+from steelyard.io.streams.clocks import Clock, common_origin, one_column
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec
 from steelyard.io.tables.files import TEXT, Columns, Table, choose_columns, find_file
 from steelyard.logs.recording import Stream
@@ -161,11 +161,7 @@ def _channels(spec: StreamSpec, table: Table, cells: Columns, gravity: Array) ->
 
 
 def _seconds(
-    specs: Sequence[StreamSpec],
-    tables: Sequence[Table],
-    cells: Sequence[Columns],
-    rows: Sequence[int],
-    gaps: bool,
+    specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Columns], rows: Sequence[int], gaps: bool
 ) -> list[Array | None]:
     """Return seconds after one common origin; a stream with only a rate starts with the earliest clock.
 
@@ -183,7 +179,7 @@ def _seconds(
     for i, spec in enumerate(specs):
         if spec.time is not None and not spec.time.columns:
             check.likely_step(1 / spec.time.rate, spec.time.where)
-            seconds[i] = steady(spec.time.rate, rows[i], start)
+            seconds[i] = check.frozen(start + np.arange(rows[i]) / spec.time.rate)
     return seconds
 
 

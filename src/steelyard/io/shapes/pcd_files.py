@@ -50,17 +50,18 @@ def _layout(path: Path, header: dict[str, list[str]]) -> tuple[np.dtype[Any], in
     names = header.get("FIELDS", [])
     counts = header.get("COUNT", ["1"] * len(names))
     kinds = list(zip(header.get("TYPE", []), header.get("SIZE", []), strict=False))
+    unfit = BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.")
     try:
         points = int(header["POINTS"][0])
         widths = [int(width) for width in counts]
         types = [_TYPES[kind] for kind in kinds]
     except (KeyError, IndexError, ValueError):
-        raise BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.") from None
+        raise unfit from None
     if len(names) > _MOST_FIELDS:
         raise BadFile(f"{path}: the PCD header has {len(names)} fields, more than the {_MOST_FIELDS} that are read.")
     sound = points >= 0 and all(1 <= width <= _WIDEST for width in widths)
     if not names or len({len(names), len(types), len(widths)}) > 1 or not sound:
-        raise BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.")
+        raise unfit
     # padding fields are all called "_", and are left out like all that begin so: number them
     named = [name if name[0] != "_" and names.count(name) == 1 else f"_{k}" for k, name in enumerate(names)]
     fields: list[Any] = [

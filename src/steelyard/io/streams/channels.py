@@ -19,7 +19,7 @@ from steelyard.findings import Finding
 from steelyard.io.rotations import rotation_of
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec
 from steelyard.io.units import ANGLE, factor
-from steelyard.logs.recording import Stream
+from steelyard.logs.recording import Stream, known_rows
 
 _SHOWN = 5
 _LARGEST = 1e9  # in SI: nothing that a robot feels or does is as large
@@ -27,14 +27,26 @@ _LARGEST = 1e9  # in SI: nothing that a robot feels or does is as large
 MOST_MISSING = 0.1
 
 
-def channel(spec: QuantitySpec, columns: Sequence[Array], gravity: Array) -> Array:
+def channel_with_gaps(spec: QuantitySpec, columns: Sequence[Array], gravity: Array) -> Array:
     """Return a quantity as (N, 3) in SI, or (N, 3, 3) for rotation, from its columns, each (N,).
 
-    `gravity` (3,) [m/s^2] says what one g is. Raises BadValue naming the rows that are wrong.
+    `gravity` (3,) [m/s^2] says what one g is. Rows that miss a number are NaN. Raises BadValue where all do, and naming
+    the rows that are wrong.
     """
     _require_one_length(spec, columns)
     values = np.stack(columns, -1)
-    require_finite(values, spec.where)
+    good = known_rows(values)
+    if good.all():
+        return _in_si(spec, values, gravity)
+    if not good.any():
+        require_finite(values, spec.where)
+    out = np.array(_in_si(spec, np.where(good[:, None], values, values[good.argmax()]), gravity))
+    out[~good] = np.nan
+    return check.frozen(out)
+
+
+def _in_si(spec: QuantitySpec, values: Array, gravity: Array) -> Array:
+    """Return the numbers (N, k) of a quantity in SI, rotations as matrices; raises BadValue naming the wrong rows."""
     if spec.form is None:
         values = values * factor(spec.name, spec.unit, gravity)
         _require_likely(values, spec.where)
@@ -43,26 +55,6 @@ def channel(spec: QuantitySpec, columns: Sequence[Array], gravity: Array) -> Arr
         return rotation_of(values, spec.form, ANGLE[spec.unit]).matrix
     except BadValue as error:
         raise BadValue(f"{spec.where}: {error}") from None
-
-
-def channel_with_gaps(spec: QuantitySpec, columns: Sequence[Array], gravity: Array) -> Array:
-    """Return a quantity like `channel`, with NaN in rows that miss a number; raises BadValue where all do."""
-    _require_one_length(spec, columns)
-    values = np.stack(columns, -1)
-    good = known_rows(values)
-    if good.all() or not good.any():
-        return channel(spec, columns, gravity)
-    out = np.array(channel(spec, list(np.where(good[:, None], values, values[good.argmax()]).T), gravity))
-    out[~good] = np.nan
-    return check.frozen(out)
-
-
-def known_rows(values: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return which rows of (N, ..) hold numbers; a sum that is one shows at once that all do."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        if np.isfinite(values.sum()):
-            return np.ones(len(values), np.bool_)
-    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(1))
 
 
 def require_finite(values: Array, where: str) -> None:
@@ -127,7 +119,7 @@ def without_missing(
     Each stream with a clock loses its own rows; those without one belong together row by row and lose them together.
     Raises BadValue where more than a tenth of the rows would be lost.
     """
-    whole = [_whole(stream) for stream in streams]
+    whole = [stream.known for stream in streams]
     if all(rows.all() for rows in whole):
         return tuple(streams), ()
     findings = [
@@ -141,12 +133,6 @@ def without_missing(
         whole = [together] * len(streams)
     kept = (s if rows.all() else s.rows(rows) for s, rows in zip(streams, whole, strict=True))
     return tuple(kept), tuple(findings)
-
-
-def _whole(stream: Stream) -> Mask:
-    """Return which rows (N,) hold a number everywhere."""
-    columns = [*stream.channels.values(), *(() if stream.time is None else (stream.time,))]
-    return np.asarray(np.logical_and.reduce([known_rows(column) for column in columns]))
 
 
 def _require_most(spec: StreamSpec, stream: Stream, rows: Mask) -> None:

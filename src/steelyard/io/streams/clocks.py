@@ -157,11 +157,6 @@ def common_origin(clocks: Sequence[Clock]) -> int:
     return earliest if abs(earliest) > _LARGE else 0
 
 
-def steady(rate: float, rows: int, start: float) -> Array:
-    """Return (rows,) [s] from `start` at `rate` [Hz]."""
-    return check.frozen(start + np.arange(rows) / rate)
-
-
 def one_column(columns: Sequence[Stamps], units: Sequence[str], where: str) -> Stamps:
     """Return stamps (N,): one column as it is; two, in `units` of time, added as datetime64[ns], NaT where one misses.
 

@@ -18,14 +18,7 @@ from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS, instead, spelled
 from steelyard.logs.recording import QUANTITIES, Mount
 from steelyard.spatial import Rotation
 
-FRAMED = (
-    "force",
-    "torque",
-    "linear_velocity",
-    "angular_velocity",
-    "linear_acceleration",
-    "angular_acceleration",
-)
+FRAMED = ("force", "torque", "linear_velocity", "angular_velocity", "linear_acceleration", "angular_acceleration")
 
 # [s] between clocks with different origins; [m] from S to anything that is fixed to it.
 LONGEST_DELAY, _FURTHEST = 1e10, 10.0

@@ -49,11 +49,7 @@ class JointReadings(Protocol):
 
 
 def write_team(
-    log: TeamLog,
-    path: Path,
-    joints: Sequence[Mapping[str, JointReadings]] = (),
-    *,
-    heading: str = "",
+    log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings]] = (), *, heading: str = ""
 ) -> Path:
     """Write the description to `path` and one CSV per robot and recording into the folder of that name beside it.
 

@@ -20,7 +20,6 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.full_fit import Rows
-from steelyard.sanity.readings.glance import stream_of
 from steelyard.sanity.words import axis_words, mount_remedy, mounted
 from steelyard.spatial import Rotation, cross_matrix
 
@@ -130,7 +129,7 @@ def examine_sensor(
     known     what was found before: a tilted base or a wrench that nothing explains is not looked at again
     drift     whether the bias was taken to grow with time
     """
-    stream, found = stream_of(recording, "force"), _looked_at(log, known, drift)
+    stream, found = recording.stream_of("force"), _looked_at(log, known, drift)
     if stream is None or found is None:
         return estimate, ()
     turned = found.turned and not in_world(stream)
@@ -142,7 +141,7 @@ def turn_of(
     log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool = False
 ) -> tuple[float, float, float] | None:
     """Return the rotation vector [rad] by which the wrench is turned beyond doubt, None where it is not."""
-    stream, found = stream_of(recording, "force"), _looked_at(log, known, drift)
+    stream, found = recording.stream_of("force"), _looked_at(log, known, drift)
     if stream is None or in_world(stream) or found is None or not found.turned:
         return None
     x, y, z = (float(v) for v in found.turn)
@@ -168,7 +167,7 @@ def in_world(stream: Stream) -> bool:
 
     Its gains are still those of the axes of S, and show once it is turned back. Poses beside it always are in W.
     """
-    return "W" in {stream.frames.get(quantity, "S") for quantity in ("force", "torque")}
+    return stream.in_world("force") or stream.in_world("torque")
 
 
 def _sure(value: Array, std: Array, least: float) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 
 from steelyard.check import Array, Integers, Mask
 from steelyard.identify.cost.dense import solved
+from steelyard.logs.two_states import cheapest_path
 
 # Nodes of the candidates' time grid, and the smallest share of time a kept set may cover.
 NODES, LEAST_KEPT = 36, 0.25
@@ -126,23 +127,10 @@ def _split(error: Array, least: int, lost: float) -> tuple[float, int]:
     return best, chosen
 
 
-@numba.njit(cache=True)
-def _path(square: Array, out: float, switch: float) -> Mask:
-    """Return which slices are untouched on the cheapest path; square (F,) costs half of itself, touch costs `out`."""
-    n = len(square)
-    back = np.zeros((n, 2), np.int8)
-    a, b = 0.0, 0.0
-    for i in range(n):
-        stay_a, come_a, stay_b, come_b = a, b + switch, b, a + switch
-        back[i, 0] = 0 if stay_a <= come_a else 1
-        back[i, 1] = 1 if stay_b <= come_b else 0
-        a, b = min(stay_a, come_a) + square[i] / 2, min(stay_b, come_b) + out
-    kept = np.zeros(n, np.bool_)
-    state = 0 if a <= b else 1
-    for i in range(n - 1, -1, -1):
-        kept[i] = state == 0
-        state = back[i, state]
-    return kept
+def _untouched(square: Array) -> Mask:
+    """Return which slices are untouched on the cheapest path; square (F,) costs half of itself, touch costs OUT."""
+    step = np.tile(SWITCH * (1 - np.eye(2)), (len(square) - 1, 1, 1))
+    return np.asarray(cheapest_path(step, np.stack([square / 2, np.full(len(square), OUT)], axis=1)) == 0)
 
 
 def fit(slices: Slices, kept: Mask, tolerance: Array, late: Array | float = 0.0) -> Array:
@@ -214,7 +202,7 @@ def refine(slices: Slices, x: Array, kept: Mask) -> Consensus | None:
     for _ in range(PASSES):
         residual, tolerance, late = _misfit(slices, x, kept)
         square = ((residual / tolerance) ** 2).sum(1)
-        before, kept = kept, _path(square, OUT, SWITCH)
+        before, kept = kept, _untouched(square)
         if kept.mean() < LEAST_KEPT:
             return None
         x = fit(slices, kept, tolerance, late)

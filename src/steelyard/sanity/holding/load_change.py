@@ -70,15 +70,19 @@ class _Running:
     def normal(self, j: int, columns: slice) -> tuple[Array, Array]:
         """Return the normal equations H (p + q, p + q) and g where the q `columns` are anew from slice j on."""
         H, g = self.H[-1], self.g[-1]
-        late, late_g = H - self.H[j], g - self.g[j]
-        size = late_g[columns].size
-        out = np.block([[H, late[:, columns]], [late[columns], late[columns, columns]]])
-        return out + np.diag(np.append(self.ridge, self.ridge[columns][:size])), np.append(g, late_g[columns])
+        normal, right = _anew(H, g, H - self.H[j], g - self.g[j], columns)
+        return normal + np.diag(np.append(self.ridge, self.ridge[columns])), right
 
     def cost(self, j: int, columns: slice) -> float:
         """Return the least squared residual where `columns` are anew from slice j on."""
         H, g = self.normal(j, columns)
         return self.c - float(g @ solve(H, g))
+
+
+def _anew(H: Array, g: Array, late: Array, late_g: Array, columns: slice) -> tuple[Array, Array]:
+    """Return normal equations H (p + q, p + q) and g where the q `columns` are anew in the rows that `late` sums."""
+    out = np.block([[H, late[:, columns]], [late[columns], late[columns, columns]]])
+    return out, np.append(g, late_g[columns])
 
 
 def longer_side(time: Array, at: float, what: str, slipped: bool) -> tuple[Mask, Finding]:
@@ -218,6 +222,5 @@ def _best(rows: Rows) -> float | None:
 def _left(whole: Array, late: Array) -> float:
     """Return the weighted squared residual with first moments anew in the rows summed in `late` (p + 1, p + 1)."""
     p = len(whole) - 1
-    H = np.block([[whole[:p, :p], late[:p, _FIRST]], [late[_FIRST, :p], late[_FIRST, _FIRST]]])
-    g = np.append(whole[:p, p], late[_FIRST, p])
+    H, g = _anew(whole[:p, :p], whole[:p, p], late[:p, :p], late[:p, p], _FIRST)
     return float(whole[p, p] - g @ inverse_scaled(H, RANK) @ g)

@@ -18,7 +18,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding, percent
 from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.readings.glance import glance, resampled, stream_of
+from steelyard.sanity.readings.glance import glance, resampled
 from steelyard.sanity.readings.rivals import best_rival, reading_of
 from steelyard.sanity.readings.static_fit import masses_at_a_glance
 from steelyard.spatial import Rotation
@@ -58,9 +58,7 @@ def examine_clock(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]
     said = {UNITS.index(s.said) for s in recording.streams}
     for steps, seconds in enumerate(SMALLER[: len(UNITS) - 1 - max(said)], 1):
         # A delay was declared in a unit of its own.
-        quicker = replace(
-            recording, streams=tuple(replace(s, time=np.asarray(s.time) * seconds) for s in recording.streams)
-        )
+        quicker = replace(recording, streams=tuple(replace(s, time=s.stamps * seconds) for s in recording.streams))
         if _one_mass(quicker):
             return quicker, (_finding(said, steps),)
     return _doubted(recording), ()
@@ -68,7 +66,7 @@ def examine_clock(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]
 
 def _doubted(recording: Recording) -> Recording:
     """Return the recording with a note where its poses turn little by little although rows are seconds apart."""
-    turning = stream_of(recording, "rotation")
+    turning = recording.stream_of("rotation")
     if turning is None or turning.time is None or len(turning) < FEWEST_ROWS:
         return recording
     step, span = median_step(turning.time), float(turning.time[-1] - turning.time[0])
@@ -81,7 +79,7 @@ def _doubted(recording: Recording) -> Recording:
         f"rows are {step:.3g} s apart over {span / 3600:.2g} h, but poses turn little by little: if it was quicker, "
         "the stamps are in a smaller unit than was said"
     )
-    return replace(recording, notes=(*recording.notes, note))
+    return recording.noted(note)
 
 
 def _finding(said: set[int], steps: int) -> Finding:
@@ -110,27 +108,26 @@ def _one_mass(recording: Recording) -> bool:
 
 def examine_offset(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording with the streams of other files moved to the clock of the wrench, and what is said of it."""
-    felt, posed = stream_of(recording, "force", "torque"), stream_of(recording, "rotation")
+    felt, posed = recording.stream_of("force", "torque"), recording.stream_of("rotation")
     if felt is None or posed is None or felt.time is None or posed.time is None or posed.delay is not None:
         return recording, ()
-    if _file(felt) == _file(posed) or felt.frames.get("force", "S") == "W" or _explained(recording):
+    if _file(felt) == _file(posed) or felt.in_world("force") or _explained(recording):
         return recording, ()
     late, left, before = _best(felt, posed, felt.time, posed.time)
     if abs(late) < LEAST_S or left > min(WELL, MUCH_BETTER * before):
         return recording, ()
-    moved = tuple(
-        s
-        if s.time is None or s.delay is not None or _file(s) == _file(felt)
-        else replace(s, time=s.time - late, moved=late)
-        for s in recording.streams
-    )
     text = (
         f"The stamps of '{posed.name}' are {'late' if late > 0 else 'early'} by {abs(late):.1f} s against the wrench: "
         f"so moved, {percent(left)} of the force variance is left unexplained"
         f"{f' instead of {percent(before)}' if before < 1 else ', and as given they share too little time'}. "
         "The answer assumes this."
     )
-    return replace(recording, streams=moved), (Finding("stream-delayed", text, REMEDY),)
+
+    def moved(s: Stream) -> Stream:
+        stays = s.time is None or s.delay is not None or _file(s) == _file(felt)
+        return s if stays else replace(s, time=s.stamps - late, moved=late)
+
+    return recording.changed(moved), (Finding("stream-delayed", text, REMEDY),)
 
 
 def _file(stream: Stream) -> str:

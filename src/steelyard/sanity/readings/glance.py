@@ -7,7 +7,7 @@ Nothing is read out of holes in a stream, nor out of knocks: a line across eithe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -147,7 +147,7 @@ def angular_velocity(rotation: Array, rate: float) -> Array:
 
 def glance(recording: Recording) -> Glance | None:
     """Return the rows, or None where the recording has no wrench, no direction of gravity, or next to no rows."""
-    stream = stream_of(recording, "force", "torque")
+    stream = recording.stream_of("force", "torque")
     if stream is None:
         return None
     return _of_table(recording, stream) if stream.time is None else _of_clocks(recording, stream)
@@ -160,20 +160,7 @@ def in_axes(recording: Recording, world: Collection[str]) -> Recording:
         felt = {part: "W" if part in world else "S" for part in _PARTS if part in stream.channels}
         return replace(stream, frames={**stream.frames, **felt}) if felt else stream
 
-    return replace(recording, streams=tuple(map(said, recording.streams)))
-
-
-def stream_of(recording: Recording, *quantities: str) -> Stream | None:
-    """Return the first stream that holds all of the quantities; None where there is none."""
-    return next((s for s in recording.streams if set(quantities) <= set(s.channels)), None)
-
-
-def channel(recording: Recording, *quantities: str) -> Iterator[tuple[Stream, str, Array]]:
-    """Yield stream, quantity and values (N, ..) of every channel that holds one of the quantities."""
-    for quantity in quantities:
-        for stream in recording.streams:
-            if quantity in stream.channels:
-                yield stream, quantity, stream.channels[quantity]
+    return recording.changed(said)
 
 
 def resampled(time: Array, values: Array, grid: Array) -> Array:
@@ -220,7 +207,7 @@ def _posed(
 
 def _first(recording: Recording, quantity: str, on_rows: OnRows) -> Array | None:
     """Return the first channel that holds a quantity, at the rows of a glance; None where none does."""
-    return next((on_rows(stream, values) for stream, _, values in channel(recording, quantity)), None)
+    return next((on_rows(stream, values) for stream, _, values in recording.channels(quantity)), None)
 
 
 def _pulls(recording: Recording, on_rows: OnRows, wrench: Array) -> tuple[Array | None, Array | None]:
@@ -229,7 +216,7 @@ def _pulls(recording: Recording, on_rows: OnRows, wrench: Array) -> tuple[Array 
     Then the same with the wrench of the other sign, where the wrench itself decides how the accelerometer sits; None
     where there is neither.
     """
-    found = next(channel(recording, "gravity", "specific_force"), None)
+    found = next(recording.channels("gravity", "specific_force"), None)
     if found is None:
         return None, None
     stream, quantity, given = found
@@ -247,8 +234,7 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     used = [s for s in timed if s is stream or {"rotation", "gravity", "specific_force", "position"} & set(s.channels)]
     if stream not in used:
         return None
-    start = max(float(s.time[0]) - (s.delay or 0.0) for s in used if s.time is not None)
-    end = min(float(s.time[-1]) - (s.delay or 0.0) for s in used if s.time is not None)
+    start, end = max(float(s.sampled[0]) for s in used), min(float(s.sampled[-1]) for s in used)
     rate = min(_RATE_HZ, _MOST_ROWS / max(end - start, 1e-9))
     rows = int((end - start) * rate)
     if rows < _FEWEST_ROWS or rate < 4 * CUTOFF_HZ:
@@ -256,12 +242,12 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     grid = np.asarray(start + (np.arange(rows) + 0.5) / rate, dtype=np.float64)
 
     def on_grid(s: Stream, values: Array) -> Array:
-        return resampled(_stamps(s), values, grid)
+        return resampled(s.sampled, values, grid)
 
     raw = Felt.of(stream, recording.wrench_sign)
-    knocks = merged(*(bursts(_stamps(stream), stream.channels[part]) for part in _PARTS))
-    calm = ~inside(_stamps(stream), knocks)
-    wrench = np.where(recording.dead, 0.0, resampled(_stamps(stream)[calm], raw.values[calm], grid))
+    knocks = merged(*(bursts(stream.sampled, stream.channels[part]) for part in _PARTS))
+    calm = ~inside(stream.sampled, knocks)
+    wrench = np.where(recording.dead, 0.0, resampled(stream.sampled[calm], raw.values[calm], grid))
     seen = replace(recording, streams=tuple(used))
     posed = _posed(seen, on_grid, wrench)
     if posed is None:
@@ -278,11 +264,6 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     )  # fmt: skip
 
 
-def _stamps(stream: Stream) -> Array:
-    """Return the stamps (N,) [s] of a stream with a clock, less a delay that was given."""
-    return np.asarray(stream.time) - (stream.delay or 0.0)
-
-
 def _unseen(felt: Stream, others: list[Stream]) -> Array:
     """Return the times (K, 2) [s] in which no row of a stream is near: of the wrench, or of others in motion."""
     missing = [holes(felt) - (felt.delay or 0.0), *(unknown_motion(s) - (s.delay or 0.0) for s in others)]
@@ -293,11 +274,11 @@ def _acceleration(recording: Recording, rotation: Array | None, on_grid: OnRows,
     """Return the acceleration (N, 3) of the S origin in W from the first channel that tells it."""
     if rotation is None:
         return None
-    for stream, quantity, values in channel(recording, "linear_acceleration", "linear_velocity", "position"):
+    for stream, quantity, values in recording.channels("linear_acceleration", "linear_velocity", "position"):
         if stream.time is None:
             continue
         smooth = on_grid(stream, values)
-        if quantity != "position" and stream.frames.get(quantity, "S") == "S":
+        if not stream.in_world(quantity):
             smooth = np.einsum("nij,nj->ni", rotation, smooth)
         for _ in range({"linear_acceleration": 0, "linear_velocity": 1, "position": 2}[quantity]):
             smooth = np.gradient(smooth, 1 / rate, axis=0)

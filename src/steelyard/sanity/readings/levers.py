@@ -15,7 +15,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import REMEDIES, Finding
 from steelyard.logs.recording import INCH, POUND_FORCE, STANDARD_GRAVITY, Recording
-from steelyard.sanity.readings.glance import Glance, stream_of
+from steelyard.sanity.readings.glance import Glance
 from steelyard.sanity.readings.rivals import Reading
 from steelyard.sanity.readings.static_fit import StaticFit, columns, solve
 from steelyard.sanity.readings.units import scaled
@@ -54,7 +54,7 @@ class Unit:
     def put_right(self, recording: Recording) -> Recording:
         """Return the recording with force and torque multiplied."""
         for quantity, factor in (("force", self.force), ("torque", self.torque)):
-            stream = stream_of(recording, quantity)
+            stream = recording.stream_of(quantity)
             if stream is not None and factor != 1:
                 recording = scaled(recording, stream, quantity, factor)
         return recording
@@ -165,7 +165,7 @@ def far_away(recording: Recording, view: Glance, reading: Reading) -> tuple[Reco
     found = reading.fit
     size, spread = float(np.linalg.norm(found.moment)), float(np.linalg.norm(found.moment_std))
     lost = not found.sign or found.arm < FURTHEST_ARM or size < 5 * spread or found.torque_share > 0.7
-    if lost or stream_of(recording, "force", "torque") is None:
+    if lost or recording.stream_of("force", "torque") is None:
         return recording, ()
     where = f"The centre of mass comes out {found.arm:.3g} m from the sensor, with a mass of {abs(found.mass):.3g} kg"
     if found.arm * KILONEWTONS.ratio < FURTHEST_ARM and abs(found.mass) < LIGHT:

@@ -253,6 +253,6 @@ def _put_right(recording: Recording, misread: Misread) -> Recording | None:
             put = {"rotation": meant}
             if misread.whole and place is not None:
                 put["position"] = frozen(-np.einsum("nij,nj->ni", meant, place))
-            stream, able = replace(stream, channels={**stream.channels, **put}), True
+            stream, able = stream.with_channels(**put), True
         streams.append(stream)
     return replace(recording, streams=tuple(streams)) if able else None

@@ -88,9 +88,7 @@ def free_direction(
 
     columns, lever (N, 3, 3), force (N, 3), block (N,); `gravity` (3,) is kept in directions that no column shows.
     """
-    centred = columns - columns.mean(0)
-    scatter = np.einsum("nik,nil->kl", centred, centred)
-    values, axes = np.linalg.eigh(scatter)
+    values, axes = _shown(columns)
     shown = axes[:, values > _BLIND * max(float(values[-1]), 1e-12)]
     seen = shown @ shown.T
     if values[-1] < 1e-4 * len(force):
@@ -108,6 +106,13 @@ def free_direction(
     everything = weights(all_rows[None])[0]
     angles = angle_between(weights(left_out), everything)
     return everything, float(np.sqrt(jackknife(angles[:, None])[0, 0])), seen
+
+
+def _shown(columns: Array) -> tuple[Array, Array]:
+    """Return how columns (N, 3, 3) vary along directions (3, 3) of W, least first; a bias hides what is constant."""
+    centred = columns - columns.mean(0)
+    values, axes = np.linalg.eigh(np.einsum("nik,nil->kl", centred, centred))
+    return values, axes
 
 
 def angle_between(a: Array, b: Array) -> Array:
@@ -154,8 +159,7 @@ def _refined(seen: Seen, force: Array, turn: Rotation, block: Integers) -> Turn:
 def blind_axis(view: Glance, rotation: Array) -> Array | None:
     """Return the direction (3,) of W along which gravity cannot be seen beside a bias, None where there is none."""
     turned = view.smooth(np.swapaxes(rotation, 1, 2).reshape(len(rotation), 9)).reshape(-1, 3, 3)
-    centred = turned - turned.mean(0)
-    values, axes = np.linalg.eigh(np.einsum("nik,nil->kl", centred, centred))
+    values, axes = _shown(turned)
     bar = _BLIND * float(values[2])
     return np.asarray(axes[:, 0]) if values[0] < bar < values[1] else None
 

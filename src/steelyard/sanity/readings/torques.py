@@ -161,7 +161,7 @@ def examine_swapped(recording: Recording, view: Glance) -> tuple[Recording, tupl
     given = fit(view.seen(recording.gravity, view.rotation), view.block)
     if given.force_share < UNEXPLAINED:
         return recording, ()
-    other = replace(recording, streams=tuple(map(_exchanged, recording.streams)))
+    other = recording.changed(_exchanged)
     seen = glance(other)
     if seen is None:
         return recording, ()

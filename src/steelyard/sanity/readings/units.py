@@ -19,7 +19,7 @@ from steelyard.findings import Finding, percent
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.imu import first_mount, unit_factor
 from steelyard.logs.recording import STANDARD_GRAVITY, Recording, Stream
-from steelyard.sanity.readings.glance import CUTOFF_HZ, angular_velocity, channel, resampled, stream_of
+from steelyard.sanity.readings.glance import CUTOFF_HZ, angular_velocity, resampled
 from steelyard.spatial import Rotation
 
 # No arm moves its hand faster [m/s], or stands in poses further apart [m]: such numbers are millimetres.
@@ -56,14 +56,14 @@ def examine_units(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]
 
 def scaled(recording: Recording, stream: Stream, quantity: str, factor: float) -> Recording:
     """Return the recording with one channel of one stream multiplied by `factor`."""
-    changed = replace(stream, channels={**stream.channels, quantity: stream.channels[quantity] * factor})
-    return replace(recording, streams=tuple(changed if s is stream else s for s in recording.streams))
+    larger = stream.with_channels(**{quantity: stream.channels[quantity] * factor})
+    return recording.changed(lambda s: larger if s is stream else s)
 
 
 def _require_no_gravity(recording: Recording) -> None:
     """Raise BadDescription where a linear acceleration is as long as gravity most of the time: no arm moves so."""
     gravity = float(np.linalg.norm(recording.gravity))
-    for stream, _, values in channel(recording, "linear_acceleration"):
+    for stream, _, values in recording.channels("linear_acceleration"):
         size = float(np.median(np.linalg.norm(values, axis=1)))
         if gravity > ONE_G[1] and ONE_G[0] * gravity < size < ONE_G[1] * gravity:
             raise BadDescription(
@@ -83,7 +83,7 @@ def _gravity(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
 
 
 def _gravity_channel(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
-    for stream, quantity, values in channel(recording, "gravity"):
+    for stream, quantity, values in recording.channels("gravity"):
         size = float(np.median(np.linalg.norm(values, axis=1)))
         if ONE_G[0] < size < ONE_G[1]:
             message = (
@@ -98,7 +98,7 @@ def _specific_force(recording: Recording) -> tuple[Recording, tuple[Finding, ...
     gravity = float(np.linalg.norm(recording.gravity))
     if gravity <= 0:
         return recording, ()
-    for stream, quantity, values in channel(recording, "specific_force"):
+    for stream, quantity, values in recording.channels("specific_force"):
         factor = unit_factor(values, gravity)
         if factor != 1.0:
             size = float(np.median(np.linalg.norm(values, axis=1)))
@@ -115,7 +115,7 @@ def _positions(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     found = []
     checks: dict[str, Callable[[Stream, Array], str]] = {"position": _far, "linear_velocity": _fast}
     for quantity, judge in checks.items():
-        for stream, _, values in list(channel(recording, quantity)):
+        for stream, _, values in list(recording.channels(quantity)):
             why = judge(stream, values)
             if why:
                 recording = scaled(recording, stream, quantity, 1e-3)
@@ -148,15 +148,15 @@ def examine_turning(recording: Recording) -> tuple[Recording, tuple[Finding, ...
 
     Also returns a finding where those are not the ones that it was said to be in.
     """
-    given = next(channel(recording, "angular_velocity"), None)
-    turned = next(channel(recording, "rotation"), None)
+    given = next(recording.channels("angular_velocity"), None)
+    turned = next(recording.channels("rotation"), None)
     if given is not None and turned is None:
         return _beside_accelerometer(recording, given[0])
     both = None if given is None or turned is None else _side_by_side(given[0], turned[0])
     if given is None or both is None:
         return recording, ()
     stream, shown, rotation, omega = given[0], *both
-    frame = stream.frames.get("angular_velocity", "S")
+    frame = "W" if stream.in_world("angular_velocity") else "S"
     unlike = _share(shown, omega if frame == "S" else _into_world(rotation, omega))
     if unlike < UNLIKE:
         return recording, ()
@@ -212,7 +212,7 @@ def _on_one_clock(*channels: tuple[Stream, str]) -> list[Array] | None:
     """Return channels (N, ..) of streams with clocks in the same even steps, None where there are few."""
     if any(s.time is None or len(s) < _FEWEST_ROWS for s, _ in channels):
         return None
-    clocks = [np.asarray(s.time) - (s.delay or 0.0) for s, _ in channels]
+    clocks = [s.sampled for s, _ in channels]
     start, end = max(float(t[0]) for t in clocks), min(float(t[-1]) for t in clocks)
     rows = int((end - start) * _RATE_HZ)
     if rows < _FEWEST_ROWS:
@@ -226,10 +226,10 @@ def _beside_accelerometer(recording: Recording, stream: Stream) -> tuple[Recordi
 
     One inertial unit has one set of axes, and its drivers write both in those: f' = -omega x f at rest, in them.
     """
-    felt = stream_of(recording, "force")
-    if felt is None or "specific_force" not in stream.channels or "W" in (
-        stream.frames.get("angular_velocity"), felt.frames.get("force")
-    ):  # fmt: skip
+    felt = recording.stream_of("force")
+    if felt is None or "specific_force" not in stream.channels:
+        return recording, ()
+    if stream.in_world("angular_velocity") or felt.in_world("force"):
         return recording, ()
     rows = _on_one_clock((stream, "angular_velocity"), (stream, "specific_force"), (felt, "force"))
     if rows is None:
@@ -273,6 +273,6 @@ def _text(what: str, left: float, unlike: float) -> str:
 def _read(recording: Recording, old: Stream, factor: float, frame: str, mount: Rotation | None = None) -> Recording:
     """Return the recording with the angular velocity of a stream times a factor, in a frame, or turned into S."""
     values = factor * old.channels["angular_velocity"]
-    channels = {**old.channels, "angular_velocity": values if mount is None else mount.apply(values)}
-    new = replace(old, channels=channels, frames={**old.frames, "angular_velocity": frame})
-    return replace(recording, streams=tuple(new if stream is old else stream for stream in recording.streams))
+    new = old.with_channels(angular_velocity=values if mount is None else mount.apply(values))
+    new = replace(new, frames={**old.frames, "angular_velocity": frame})
+    return recording.changed(lambda stream: new if stream is old else stream)

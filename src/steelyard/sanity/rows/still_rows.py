@@ -21,7 +21,6 @@ from steelyard.logs.autocorrelation import correlation_time
 from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import runs
-from steelyard.sanity.readings.glance import channel, stream_of
 from steelyard.spatial import Rotation
 
 _KEPT = ("force", "torque", "rotation", "gravity", "specific_force")
@@ -130,7 +129,7 @@ def examine_memory(recording: Recording) -> Recording:
     note = f"rows of one pose remember each other over {worth:.0f} rows: means over {length:.0f} were read"
     if apart >= WORTH_LESS:
         note = f"poses scatter {apart:.2g} times as much as their rows tell: one mean for each pose was read"
-    return replace(recording, streams=streams, notes=(*recording.notes, f"{note}, {rows} in all"))
+    return replace(recording, streams=streams).noted(f"{note}, {rows} in all")
 
 
 def _apart(down: Array, other: Array) -> Array:
@@ -178,10 +177,10 @@ def _apart_by(recording: Recording, pull: Array, poses: Integers, worth: float) 
 
 def _felt(recording: Recording) -> Array | None:
     """Return torque and force (N, 6) in S, up to where and how the sensor sits; None where no rotation leads there."""
-    turn = next((v for _, _, v in channel(recording, "rotation")), None)
+    turn = next((v for _, _, v in recording.channels("rotation")), None)
     parts = []
-    for stream, part, values in channel(recording, "torque", "force"):
-        if stream.frames.get(part, "S") == "W":
+    for stream, part, values in recording.channels("torque", "force"):
+        if stream.in_world(part):
             if turn is None:
                 return None
             values = np.einsum("nji,nj->ni", turn, values)
@@ -199,12 +198,11 @@ def examine_sparse(recording: Recording) -> Recording:
     if first is None or any(s.time is None or not np.array_equal(s.time, first) for s in recording.streams):
         return recording
     step = median_step(first) if len(first) > 1 else 0.0
-    R = next((v for _, _, v in channel(recording, "rotation")), None)
+    R = next((v for _, _, v in recording.channels("rotation")), None)
     if step < SPARSE_S or R is None or not (angles(np.swapaxes(R[:-1], 1, 2) @ R[1:]) > TURN).any():
         return recording
-    streams = tuple(replace(s, time=None, poses=True, delay=None) for s in recording.streams)
     note = f"rows are {step:.3g} s apart, too far to tell a motion: each was read as a still pose"
-    return replace(recording, streams=streams, notes=(*recording.notes, note))
+    return recording.changed(lambda s: replace(s, time=None, poses=True, delay=None)).noted(note)
 
 
 def examine_leaps(recording: Recording) -> Recording:
@@ -212,7 +210,7 @@ def examine_leaps(recording: Recording) -> Recording:
 
     A note says so. Logs without leaps, tables and logs without rotations come back as they are.
     """
-    turning = stream_of(recording, "rotation")
+    turning = recording.stream_of("rotation")
     if turning is None or turning.time is None or any(s.time is None for s in recording.streams):
         return recording
     if len(turning) < 2 * FEWEST_AT_REST:
@@ -235,7 +233,7 @@ def _as_table(recording: Recording, rests: Array) -> Recording:
         f"poses, averages over {WINDOW_S:g} s or less"
     )
     # Noise that was declared is that of a row.
-    return replace(recording, streams=streams, noise={}, notes=(*recording.notes, note))
+    return replace(recording, streams=streams, noise={}).noted(note)
 
 
 def _with_pauses(recording: Recording, time: Array, leap: Mask) -> Recording:
@@ -245,13 +243,10 @@ def _with_pauses(recording: Recording, time: Array, leap: Mask) -> Recording:
     if not lasting.any() or leap.mean() > MOST:
         return recording
     after = time[1:][leap][lasting]
-    streams = tuple(
-        s if s.time is None else replace(s, time=s.time + PUT_S * np.searchsorted(after, s.time, "right"))
-        for s in recording.streams
-    )
     where = ", ".join(f"{stamp - time[0]:.1f}" for stamp in after[:5]) + (" and more" if len(after) > 5 else "")
     note = f"the poses leap at {where} s, as where parts of logs are joined: a pause was put there"
-    return replace(recording, streams=streams, notes=(*recording.notes, note))
+    paused = recording.changed(lambda s: replace(s, time=s.stamps + PUT_S * np.searchsorted(after, s.stamps, "right")))
+    return paused.noted(note)
 
 
 def _partings(stream: Stream, time: Array) -> tuple[Mask, Mask]:
