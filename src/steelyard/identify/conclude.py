@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.evidence import Evidence
 from steelyard.findings import Finding, counted
@@ -21,7 +21,6 @@ from steelyard.identify.sight import Sight
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.people import ENTRIES
-from steelyard.logs.log import Mask
 
 # There is no answer at all where mass or centre of mass are looser than these shares of their natural sizes.
 LOST_MASS, LOST_COM = 1 / 3, 2.5

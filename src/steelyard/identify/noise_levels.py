@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.identify.cost.linear import inverse_scaled, loosest, normal_equations, reweighted
 from steelyard.identify.cost.noise_cost import residual_map_of, weights_at
 from steelyard.identify.rest import RIPPLE, without_acceleration
 from steelyard.inertia.regressor import design
-from steelyard.logs.log import Mask, MotionLog, Noise
+from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 from steelyard.logs.noise import MOTION, WRENCH, as_declared, mean_heard, robust_std, rounding
 

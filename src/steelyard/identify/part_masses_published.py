@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.evidence import Evidence
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.masses.models import weighed
-from steelyard.logs.log import Mask, MotionLog
+from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts
 
 # Bounds on the length of measured linear [m/s^2] and angular acceleration [rad/s^2], "below 1 unit".

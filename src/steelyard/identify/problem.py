@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import counted
 from steelyard.identify.cost.linear import normal_equations, reweighted, solve_scaled
@@ -14,7 +14,7 @@ from steelyard.identify.cost.newton import Rows
 from steelyard.identify.cost.noise_cost import information, residual_map_of, weights_at
 from steelyard.identify.noise_levels import DEAF, EVERYDAY
 from steelyard.inertia.regressor import design
-from steelyard.logs.log import Integers, Mask, MotionLog, Noise
+from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 from steelyard.logs.noise import mean_heard
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.log import Mask, MotionLog, Noise
+from steelyard.check import Array, Mask
+from steelyard.logs.log import MotionLog, Noise
 
 # What a robot that holds still does all the same: joint control ripple, rad/s^2 and m/s^2.
 RIPPLE = Noise.of_std(0.01, 0.002, 0.0, 0.0).acceleration

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.identify.cost.dense import eigen, product, product_transposed
 from steelyard.inertia.people import people_jacobian
-from steelyard.logs.log import Mask
 
 # Identified means: the data alone, without prior, give one standard deviation below these shares of
 # the mass, of the radius of gyration, and of half the trace of the inertia about the centre of mass.

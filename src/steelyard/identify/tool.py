@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import gammaincc
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding, other_than
 from steelyard.identify.estimate import Estimate
@@ -15,7 +15,6 @@ from steelyard.identify.problem import BiasPrior
 from steelyard.identify.sight import identified, natural_sizes
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.people import ENTRIES
-from steelyard.logs.log import Mask
 
 # Two runs whose biases differ with a probability below this do not share one.
 SAME_BIAS = 1e-4

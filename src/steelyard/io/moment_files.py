@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.contents import in_file
 from steelyard.io.tables.array_table import npz, read_arrays
-from steelyard.logs.log import Integers, Noise
+from steelyard.logs.log import Noise
 from steelyard.logs.moments import SIZE, Moments
 from steelyard.whole_files import write_bytes
 

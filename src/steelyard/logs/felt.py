@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.log import Integers, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.logs.recording import Stream, no_rotation
 from steelyard.spatial import Rotation
 

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
-from steelyard.check import Integers as Integers
-from steelyard.check import Mask as Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue
 from steelyard.inertia.regressor import newton_euler
 from steelyard.spatial import Pose, lever_acceleration

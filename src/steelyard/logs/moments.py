@@ -15,10 +15,10 @@ from functools import cached_property
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue
 from steelyard.inertia.regressor import basis
-from steelyard.logs.log import Integers, Mask, MotionLog, Noise
+from steelyard.logs.log import MotionLog, Noise
 
 SIZE = 19
 MOTION, ONE = slice(0, 12), 18

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.identify.bars.pose_errors import directions, pose_errors
 from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.linear import nonnegative
@@ -21,7 +21,7 @@ from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.logs.autocorrelation import lagged_products
 from steelyard.logs.clock import median_step
-from steelyard.logs.log import Integers, MotionLog
+from steelyard.logs.log import MotionLog
 
 # Shorter logs tell nothing; of longer ones so many rows in turn are joined that no more than these are left.
 FEWEST, LONGEST = 50, 20_000

@@ -8,10 +8,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.identify.cost.dense import times
 from steelyard.identify.cost.linear import inverse_scaled
-from steelyard.logs.log import Integers
 
 # Columns that hold less than this of all squares say nothing.
 NOTHING = 1e-200

@@ -16,9 +16,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.identify.cost.dense import add_product, cholesky, inverse_of, mirror, product, product_transposed
-from steelyard.logs.log import Integers
 
 # The entries of a design that are not zero: of matrix p those numbered start[p] to start[p + 1], with row, column and
 # value. Each of the ten parameters touches a few of the 6 x Z only.

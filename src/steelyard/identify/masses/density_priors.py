@@ -15,11 +15,10 @@ import numba
 import numpy as np
 from scipy.special import softmax
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.identify.cost.dense import cholesky, downhill, eigen, inner, moved, times
 from steelyard.identify.cost.linear import inverse_scaled
 from steelyard.identify.mixture import spread_of
-from steelyard.logs.log import Integers
 
 # Log density [kg/m^3] of everyday solids: wood to brass lies within one and a half deviations.
 CENTRE, WIDTH = float(np.log(2500.0)), 1.3

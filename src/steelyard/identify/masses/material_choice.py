@@ -15,11 +15,10 @@ import numba
 import numpy as np
 from scipy.special import softmax
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.identify.masses.density_priors import TRUST, log_det, mode, spread_masses
 from steelyard.identify.masses.material_sampling import draw, material_prior
 from steelyard.identify.mixture import spread_of
-from steelyard.logs.log import Integers, Mask
 from steelyard.parts.material import Material
 
 # Up to this many choices all are tried.

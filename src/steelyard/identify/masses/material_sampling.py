@@ -13,10 +13,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.identify.cost.dense import cholesky
 from steelyard.identify.masses.density_priors import TRUST
-from steelyard.logs.log import Integers
 
 # Chain c draws by evidence to the power TRUST^c. Neighbours may exchange their choices after every draw: with ten draws
 # between, shares of materials were off by up to 0.21, now by 0.07.

@@ -13,10 +13,9 @@ import math
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.identify.cost.dense import moved, times
 from steelyard.identify.cost.linear import inverse_scaled, solve_scaled
-from steelyard.logs.log import Mask
 
 # The whole weighs at least this much [kg].
 LIGHTEST = 1e-6

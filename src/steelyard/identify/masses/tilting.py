@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.identify.cost.dense import cholesky, moved, product, solved, times, transposed
 from steelyard.identify.cost.linear import inverse_scaled
 from steelyard.identify.masses.density_priors import DEEPEST, log_det
-from steelyard.logs.log import Integers
 
 STEPS, HALVINGS, FALL = 40, 12, 1e-3
 LONGEST_TILT = 0.7  # in one step
