@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, quoted
 from steelyard.inertia import InertialParameters
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import exp
@@ -285,7 +285,7 @@ def hinge_findings(team: TeamEstimate) -> list[Finding]:
     if team.hinge is None:
         return []
     hinge = team.hinge
-    holders = [" and ".join(f"'{name}'" for name in body.robots) for body in hinge.bodies]
+    holders = [quoted(body.robots) for body in hinge.bodies]
     said = hinge_words(holders, hinge.axis, hinge.point, hinge.swing, team.reference)
     said += " What is given is for both together with the hinge at the mean of its angles. "
     if np.isnan([body.mass_range[0] for body in hinge.bodies]).any():

@@ -314,7 +314,7 @@ def first_hinged(
     for i in second[1:]:
         # Grasps of the second body hang together better than each with the first.
         made[i] = made[one] @ from_twists(twist[:, one], twist[:, i])
-    grasps = Pose.from_matrix(np.array([pose.matrix() for pose in made]))
+    grasps = Pose.stacked(made)
     held = np.zeros(count, np.bool_)
     held[list(second)] = True
     rows = data.valid[:, reference]
@@ -326,7 +326,7 @@ def first_hinged(
             every = (measured[both] @ grasps[i]) @ data.poses[both, i].inverse()
             turn = Rotation.nearest(every.rotation.matrix.mean(0))
             homes[i] = Pose(turn, every.position.mean(0))
-    place = Pose.from_matrix(np.array([home.matrix() for home in homes]))
+    place = Pose.stacked(homes)
     first = [i for i in range(count) if not held[i]]
     seer = np.array(first)[np.argmax(data.valid[:, first], axis=1)]
     motion = place[seer] @ data.poses[np.arange(len(seer)), seer] @ grasps[seer].inverse()
