@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 from scipy.special import gammainccinv
 
@@ -134,27 +133,12 @@ def alone(residual: Array, J: Array, W: Array) -> Array:
     J (N, 6, 6), W (N, 6) as in the fit, all robots present.
     """
     A = np.linalg.inv(np.einsum("nia,ni,nib->ab", J, W, J))
-    through = np.empty_like(J)
+    out = np.empty_like(residual)
     for i in range(len(J)):
         held = J[i] @ A @ J[i].T * W[i]
         left, value, right = np.linalg.svd(np.eye(6) - held)
         # With two robots in all, what the joint fit shared between them is doubled; nothing is unseen.
-        inverse = right.T @ np.diag(1 / np.maximum(value, 1e-3)) @ left.T
-        through[i] = inverse
-    return _mapped(through, residual)
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _mapped(through: Array, residual: Array) -> Array:
-    """Return every residual (T, N, 6) through its robot's map (N, 6, 6)."""
-    out = np.empty_like(residual)
-    for t in range(out.shape[0]):
-        for i in range(out.shape[1]):
-            for a in range(6):
-                total = 0.0
-                for b in range(6):
-                    total += through[i, a, b] * residual[t, i, b]
-                out[t, i, a] = total
+        out[:, i] = residual[:, i] @ (left / np.maximum(value, 1e-3)) @ right
     return out
 
 
@@ -195,8 +179,16 @@ def _window(rate: float, drifts: bool) -> tuple[int, int]:
 
 
 def _steps(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tuple[Array, Array]:
-    """Return, for every row, how clear a step there is (T,) and the step (T, 6); noise (6, 6) of a row."""
-    step, good = _means_apart(np.ascontiguousarray(apart), np.ascontiguousarray(seen), width, gap, FILLED * width)
+    """Return, for every row, how clear a step there is (T,) and the step (T, 6); noise (6, 6) of a row.
+
+    The step is that of means over `width` rows on either side, without the `gap` next to the row; none at the ends.
+    """
+    rows = np.where(seen[:, None], np.column_stack([apart, np.ones(len(seen))]), 0.0)
+    total = np.concatenate([np.zeros((1, 7)), np.cumsum(rows[:-1], axis=0)])
+    sums = (total[width:] - total[:-width]).T
+    before, after = sums[:, : -(width + 2 * gap)], sums[:, width + 2 * gap :]
+    good = (before[6] > FILLED * width) & (after[6] > FILLED * width)
+    step = after[:6] / np.maximum(after[6], 1.0) - before[:6] / np.maximum(before[6], 1.0)
     score = np.zeros(len(good))
     if good.any():
         along = np.abs(np.linalg.inv(np.linalg.cholesky(noise)) @ (step if good.all() else step[:, good]))
@@ -206,26 +198,3 @@ def _steps(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tupl
     inner, every = slice(width + gap, len(seen) - width - gap), np.zeros((len(seen), 7))
     every[inner, 0], every[inner, 1:] = score, step.T
     return every[:, 0], every[:, 1:]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _means_apart(apart: Array, seen: Mask, width: int, gap: int, least: float) -> tuple[Array, Mask]:
-    """Return the means of `width` rows (T, 6) after each row less those before it (6, T - 2 width - 2 gap).
-
-    The `gap` next to the row is left out, and so are the ends; also whether more than `least` rows were seen on both
-    sides.
-    """
-    total = np.zeros((len(seen) + 1, 7))
-    for t in range(len(seen)):
-        for k in range(6):
-            total[t + 1, k] = total[t, k] + (apart[t, k] if seen[t] else 0.0)
-        total[t + 1, 6] = total[t, 6] + (1.0 if seen[t] else 0.0)
-    inner = max(len(seen) - 2 * (width + gap), 0)
-    step, good = np.empty((6, inner)), np.empty(inner, np.bool_)
-    for t in range(inner):
-        a, b, c, d = t, t + width, t + width + 2 * gap, t + 2 * width + 2 * gap
-        before, after = total[b, 6] - total[a, 6], total[d, 6] - total[c, 6]
-        good[t] = before > least and after > least
-        for k in range(6):
-            step[k, t] = (total[d, k] - total[c, k]) / max(after, 1.0) - (total[b, k] - total[a, k]) / max(before, 1.0)
-    return step, good
