@@ -184,11 +184,8 @@ def _normal(part: Bands, kind: Kind, W: Array, sums: Sums) -> Normal:
     return Normal(S[:wide, :wide], S[:wide, -1], noise, float(S[-1, -1]), each)
 
 
-# Seven parameters of the whole in its ten: first moments across the hinge, second moments of mass, products.
-FROM_TEN = np.zeros((SECOND, WHOLE))
-FROM_TEN[0, 1] = FROM_TEN[1, 2] = FROM_TEN[4, 5] = FROM_TEN[5, 6] = FROM_TEN[6, 8] = 1.0
-FROM_TEN[2, [4, 7, 9]] = -0.5, 0.5, 0.5
-FROM_TEN[3, [4, 7, 9]] = 0.5, -0.5, 0.5
+# Of ten parameters, the seven that the hinge shows, and mass, first and second moment along it, which it does not.
+FROM_TEN, FROM_ALONG = np.split(np.linalg.inv(np.column_stack([SEVEN, EXCHANGED])), [SECOND])
 # Difference quotients of the least mass are taken over this share of its standard deviations.
 SLIGHT = 1e-3
 
@@ -223,12 +220,6 @@ def seen_from(ten: Array) -> Array:
     steps = SLIGHT**2 * np.eye(6)
     sides = [InertialParameters(ten).in_frame(exp(sign * steps)).vector for sign in (-1, 1)]
     return np.asarray((sides[0] - sides[1]).T / (2 * SLIGHT**2))
-
-
-# Mass, first and second moment along the hinge of ten parameters.
-FROM_ALONG = np.zeros((3, WHOLE))
-FROM_ALONG[0, 0] = FROM_ALONG[1, 3] = 1.0
-FROM_ALONG[2, [4, 7, 9]] = 0.5, 0.5, -0.5
 
 
 def seven_rows() -> tuple[Array, Array]:
