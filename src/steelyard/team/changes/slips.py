@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import numba
 import numpy as np
 from scipy.special import gammainccinv
 
@@ -138,7 +139,7 @@ def alone(residual: Array, J: Array, W: Array) -> Array:
         held = J[i] @ A @ J[i].T * W[i]
         left, value, right = np.linalg.svd(np.eye(6) - held)
         # With two robots in all, what the joint fit shared between them is doubled; nothing is unseen.
-        out[:, i] = residual[:, i] @ (left / np.maximum(value, 1e-3)) @ right
+        out[:, i] = residual[:, i] @ ((left / np.maximum(value, 1e-3)) @ right)
     return out
 
 
@@ -179,16 +180,8 @@ def _window(rate: float, drifts: bool) -> tuple[int, int]:
 
 
 def _steps(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tuple[Array, Array]:
-    """Return, for every row, how clear a step there is (T,) and the step (T, 6); noise (6, 6) of a row.
-
-    The step is that of means over `width` rows on either side, without the `gap` next to the row; none at the ends.
-    """
-    rows = np.where(seen[:, None], np.column_stack([apart, np.ones(len(seen))]), 0.0)
-    total = np.concatenate([np.zeros((1, 7)), np.cumsum(rows[:-1], axis=0)])
-    sums = (total[width:] - total[:-width]).T
-    before, after = sums[:, : -(width + 2 * gap)], sums[:, width + 2 * gap :]
-    good = (before[6] > FILLED * width) & (after[6] > FILLED * width)
-    step = after[:6] / np.maximum(after[6], 1.0) - before[:6] / np.maximum(before[6], 1.0)
+    """Return, for every row, how clear a step there is (T,) and the step (T, 6); noise (6, 6) of a row."""
+    step, good = _means_apart(np.ascontiguousarray(apart), np.ascontiguousarray(seen), width, gap, FILLED * width)
     score = np.zeros(len(good))
     if good.any():
         along = np.abs(np.linalg.inv(np.linalg.cholesky(noise)) @ (step if good.all() else step[:, good]))
@@ -198,3 +191,26 @@ def _steps(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tupl
     inner, every = slice(width + gap, len(seen) - width - gap), np.zeros((len(seen), 7))
     every[inner, 0], every[inner, 1:] = score, step.T
     return every[:, 0], every[:, 1:]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _means_apart(apart: Array, seen: Mask, width: int, gap: int, least: float) -> tuple[Array, Mask]:
+    """Return the means of `width` rows (T, 6) after each row less those before it (6, T - 2 width - 2 gap).
+
+    The `gap` next to the row is left out, and so are the ends; also whether more than `least` rows were seen on both
+    sides.
+    """
+    total = np.zeros((len(seen) + 1, 7))
+    for t in range(len(seen)):
+        for k in range(6):
+            total[t + 1, k] = total[t, k] + (apart[t, k] if seen[t] else 0.0)
+        total[t + 1, 6] = total[t, 6] + (1.0 if seen[t] else 0.0)
+    inner = max(len(seen) - 2 * (width + gap), 0)
+    step, good = np.empty((6, inner)), np.empty(inner, np.bool_)
+    for t in range(inner):
+        a, b, c, d = t, t + width, t + width + 2 * gap, t + 2 * width + 2 * gap
+        before, after = total[b, 6] - total[a, 6], total[d, 6] - total[c, 6]
+        good[t] = before > least and after > least
+        for k in range(6):
+            step[k, t] = (total[d, k] - total[c, k]) / max(after, 1.0) - (total[b, k] - total[a, k]) / max(before, 1.0)
+    return step, good
