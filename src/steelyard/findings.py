@@ -188,6 +188,11 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
+def quoted(names: Iterable[str], between: str = " and ") -> str:
+    """Return names as a message says them: each in quotes, one after the other."""
+    return between.join(f"'{name}'" for name in names)
+
+
 def about(value: float) -> str:
     """Return a factor as a message says it: two figures, without a power of ten."""
     return f"{float(f'{value:.2g}'):g}"

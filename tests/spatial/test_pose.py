@@ -116,6 +116,13 @@ def test_component_wise_twist_derivative_becomes_classical(body: Tumble) -> None
     assert_allclose(found.array(), body.acceleration().array(), atol=1e-4)
 
 
+@given(poses((4,)))
+def test_stacked_poses_are_those_that_went_in(X: Pose) -> None:
+    stacked = Pose.stacked([X[k] for k in range(4)])
+    assert stacked.batch == (4,)
+    assert_allclose(stacked.matrix(), X.matrix(), rtol=0, atol=0)
+
+
 def test_batch_shapes_broadcast() -> None:
     many, one = Pose(Rotation.exp(np.eye(3)), np.eye(3)), Pose(Rotation.exp([0, 0, 1]), [1, 2, 3])
     assert (many @ one).batch == (3,) == (one @ many).batch

@@ -57,10 +57,7 @@ def demo_team(seed: int, output: Path, keep: Path | None, as_json: bool) -> None
 
 def _errors(found: TeamEstimate, made: ThreeOmnids) -> dict[str, Any]:
     """Return the mean errors of the grasps other than the reference."""
-    import numpy as np
-
-    off = [found.grasps[n].away_from(X) for n, X in made.grasps.items() if n != found.reference]
-    gap, turn = np.mean(off, axis=0).tolist()
+    gap, turn = found.away_from(made.grasps)
     return {"position_mm": gap, "rotation_deg": turn}
 
 

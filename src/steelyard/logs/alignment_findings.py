@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, quoted
 from steelyard.logs.clock import UNSURE_S
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Clocks
@@ -51,7 +51,7 @@ def jump_findings(jumps: Sequence[Placed], start: float) -> tuple[Finding, ...]:
 
 def _jumped(jump: Placed, start: float) -> str:
     way = "leaps ahead" if jump.size > 0 else "falls behind"
-    others = "the wrench" if jump.parted == (jump.name,) else " and ".join(f"'{name}'" for name in jump.parted)
+    others = "the wrench" if jump.parted == (jump.name,) else quoted(jump.parted)
     unsure = f", without its rows within {UNSURE_S:g} s" if jump.cut else ""
     return (
         f"The clock of '{jump.name}' {way} by {1e3 * abs(jump.size):.1f} ± {1e3 * jump.std:.2g} ms at "

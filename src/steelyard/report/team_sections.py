@@ -104,13 +104,12 @@ def _away(grasp: GraspEstimate, true: Pose) -> str:
 
 def _rivals(report: Report, seen: TeamEstimate) -> list[Html]:
     """Return what the other methods' grasps are off by, where the truth is known."""
-    true = {} if report.truth is None else {n: X for n, X in report.truth.grasps.items() if n != seen.reference}
-    rows = []
+    rows, true = [], {} if report.truth is None else report.truth.grasps
     for name, rival in report.rivals.items():
         if true and isinstance(rival, TeamEstimate):
-            off = np.array([[each.grasps[n].away_from(X) for n, X in true.items()] for each in (seen, rival)]).mean(1)
+            (own, _), (gap, turn) = (each.away_from(true) for each in (seen, rival))
             rows.append(
-                f"{name}: {general(float(off[1, 0]), 2)} mm and {general(float(off[1, 1]), 2)}° on average, "
-                f"{general(float(off[1, 0] / max(off[0, 0], 1e-12)), 2)} times as far."
+                f"{name}: {general(gap, 2)} mm and {general(turn, 2)}° on average, "
+                f"{general(gap / max(own, 1e-12), 2)} times as far."
             )
     return [joined(tag("p", row, class_="aside")) for row in rows]

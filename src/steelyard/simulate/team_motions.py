@@ -13,6 +13,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.simulate.motions import Kinematics
 from steelyard.spatial import Rotation, cross, lever_acceleration
+from steelyard.spatial.screws import second_coefficients
 
 _SMALL = 0.05  # [rad] below it three terms of a series are exact to the last digits
 SINES = 5
@@ -114,8 +115,7 @@ def rotation_vector_rates(r: Array, dr: Array, ddr: Array) -> tuple[Array, Array
     t = np.sqrt(square)
     small = t < _SMALL
     s = np.where(small, 1.0, t)
-    b = 0.5 * np.sinc(t / (2 * np.pi)) ** 2
-    c = np.where(small, 1 / 6 - square / 120 + square**2 / 5040, (s - np.sin(s)) / s**3)
+    b, c = second_coefficients(t, _SMALL)
     slope_b = np.where(small, -1 / 12 + square / 180 - square**2 / 6720, (s * np.sin(s) - 2 * (1 - np.cos(s))) / s**4)
     slope_c = np.where(small, -1 / 60 + square / 1260 - square**2 / 60480, (3 * np.sin(s) - s * (2 + np.cos(s))) / s**5)
     growth = (r * dr).sum(-1)

@@ -6,6 +6,7 @@ letters cancel, `X_AB @ X_BC = X_AC`. A log of N poses is one Pose with batch sh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, overload
 
@@ -56,6 +57,12 @@ class Pose:
         if off > 1e-9:
             raise BadValue(f"pose matrix must end in the row 0 0 0 1; it is off by {off:.2g}.")
         return cls(Rotation(m[..., :3, :3]), m[..., :3, 3])
+
+    @classmethod
+    def stacked(cls, poses: Sequence[Pose]) -> Pose:
+        """Return poses of one batch shape as one, along a new first axis."""
+        turns = Rotation._trusted(np.stack([pose.rotation.matrix for pose in poses]))
+        return cls(turns, np.stack([pose.position for pose in poses]))
 
     def matrix(self) -> Array:
         """Return homogeneous matrices (..., 4, 4) [m]."""

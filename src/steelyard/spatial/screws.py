@@ -18,7 +18,7 @@ def exp_pose(screw: ArrayLike) -> Pose:
     """Return the poses (...) reached after unit time by body twists (..., 6) [rad, m]."""
     s = check.vectors("screw", screw, 6)
     phi, rho = s[..., :3], s[..., 3:]
-    b, c = _second_coefficients(np.linalg.norm(phi, axis=-1))
+    b, c = second_coefficients(np.linalg.norm(phi, axis=-1))
     turned = cross(phi, rho)
     return Pose(Rotation.exp(phi), rho + b[..., None] * turned + c[..., None] * cross(phi, turned))
 
@@ -37,9 +37,9 @@ def log_pose(pose: Pose) -> Array:
     return np.concatenate([phi, rho], axis=-1)
 
 
-def _second_coefficients(angle: Array) -> tuple[Array, Array]:
-    """Return (1 - cos t) / t^2 and (t - sin t) / t^3."""
-    small = angle < _SMALL
+def second_coefficients(angle: Array, least: float = _SMALL) -> tuple[Array, Array]:
+    """Return (1 - cos t) / t^2 and (t - sin t) / t^3 of angles [rad], the second by its series below `least`."""
+    small = angle < least
     safe = np.where(small, 1.0, angle)
     square = angle**2
     b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2

@@ -122,8 +122,13 @@ class TeamEstimate(Estimate):
 
     def poses_of(self, names: Sequence[str]) -> Pose:
         """Return the poses (N,) of these robots' grasps in R."""
-        matrices: Array = np.array([self.grasps[name].pose.matrix() for name in names])
-        return Pose.from_matrix(matrices)
+        return Pose.stacked([self.grasps[name].pose for name in names])
+
+    def away_from(self, true: Mapping[str, Pose]) -> tuple[float, float]:
+        """Return mean distance [mm] and angle [deg] from the true grasps, of the robots other than the reference."""
+        each = [self.grasps[name].away_from(grasp) for name, grasp in true.items() if name != self.reference]
+        gap, turn = np.mean(each, axis=0).tolist()
+        return gap, turn
 
     @cached_property
     def principal_moments(self) -> Array | None:

@@ -113,9 +113,7 @@ def star(names: Sequence[str], twists: Array, measured: Mask, reference: str) ->
 
 def from_star(names: Sequence[str], pairs: Mapping[str, Pair]) -> Pose:
     """Return the poses (N,) of all grasps in that of the reference, which has no pair: its own is the identity."""
-    each = [pairs[name].pose if name in pairs else Pose.identity() for name in names]
-    turns, places = np.array([pose.rotation.matrix for pose in each]), np.array([pose.position for pose in each])
-    return Pose(Rotation(turns), places)
+    return Pose.stacked([pairs[name].pose if name in pairs else Pose.identity() for name in names])
 
 
 def total_wrench(grasps: Pose, wrench: Array) -> Array:

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
-from steelyard.findings import Finding
+from steelyard.findings import Finding, quoted
 from steelyard.logs.clipping import (
     LEFT_OUT,
     MOST_LEFT_OUT,
@@ -148,7 +148,7 @@ def stuck_forces(log: TeamLog) -> Iterator[Finding]:
                 force = _carried([track])
                 _noted(places[name], _same(force), f"'{recording.name}'", len(force))
     resting = [recording for recording in log.recordings if recording.kind == "still"]
-    where = " and ".join(f"'{r.name}'" for r in resting) if len(resting) < 3 else f"all {len(resting)} poses at rest"
+    where = quoted(r.name for r in resting) if len(resting) < 3 else f"all {len(resting)} poses at rest"
     forces = {name: _carried([r.tracks[name] for r in resting if name in r.tracks]) for name in log.names}
     for name, axes in _stuck_at_rest(forces).items():
         _noted(places[name], axes, where, len(forces[name]))

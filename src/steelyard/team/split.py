@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
-from steelyard.findings import Finding
+from steelyard.findings import Finding, quoted
 from steelyard.logs.conditioning import lowpass
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint, exp
@@ -184,7 +184,7 @@ def rigidity_findings(split: Split | None, names: Sequence[str], unweighed: str 
     """
     if split is None:
         return []
-    called = [" and ".join(f"'{names[i]}'" for i in group) for group in split.groups]
+    called = [quoted(names[i] for i in group) for group in split.groups]
     if split.hinge is not None:
         said = hinge_words(called, *split.hinge, names[split.groups[1][0]])
         return [Finding.of("payload-jointed", f"{said} {unweighed}")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from weakref import WeakKeyDictionary
@@ -170,6 +170,11 @@ def bridged(good: Mask, time: Array) -> Mask:
     for k in np.flatnonzero((gap > 1) & ((gap <= BRIDGED + 1) | (np.diff(time[there]) <= BRIEF))):
         out[there[k] : there[k + 1]] = True
     return out
+
+
+def with_rows(parts: Sequence[Stretch]) -> Iterator[tuple[Stretch, slice]]:
+    """Yield each part beside the rows that it has where all stand one after the other."""
+    return zip(parts, row_slices(parts), strict=True)
 
 
 def row_slices(parts: Sequence[Sized]) -> list[slice]:

@@ -10,6 +10,7 @@ from steelyard.check import Array, Mask
 from steelyard.findings import Finding, with_bar
 from steelyard.spatial import unit_vectors
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
+from steelyard.team.poses.measured import in_words
 
 # A clock is called late from so much [s] and so many standard deviations.
 LATE_S, LATE_STD = 1e-3, 3.0
@@ -46,11 +47,10 @@ def lost_directions(
         turned = np.linalg.matrix_rank(grasp.lost[:, :3], tol=1e-2)
         kinds = len(words)
         if apart is not None:
-            size = f"{np.rad2deg(apart[0]):.2g} deg and {1e3 * apart[1]:.2g} mm"
             yield Finding(
                 "grasp-direction-lost",
-                f"{_listed(words)}: robots disagree by {size}, which hides how the payload turned. Loud encoders do "
-                "that, and so does a base that moves or drifts though it is said to stand.",
+                f"{_listed(words)}: robots disagree by {in_words(apart[None])}, which hides how the payload "
+                "turned. Loud encoders do that, and so does a base that moves or drifts though it is said to stand.",
                 'Where a base moves, say base = "moving" and log its twists; else measure better or turn farther.',
             )
             continue

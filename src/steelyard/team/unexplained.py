@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, quoted
 from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.misread.forces import likely_factor
 from steelyard.team.misread.signs import torque_factor
@@ -77,18 +77,18 @@ def _forces(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding
         return
     why = ""
     if silent:
-        why = f"What {_listed(silent)} measures is noise alone, as if nothing were carried there. "
+        why = f"What {quoted(silent)} measures is noise alone, as if nothing were carried there. "
     elif factor is not None and abs(factor[1] - 1) > UNLIKE:
-        why = f"It falls where what {_listed(suspects)} says is taken {factor[1]:.2g} times. "
+        why = f"It falls where what {quoted(suspects)} says is taken {factor[1]:.2g} times. "
     elif factor is not None:
-        why = f"What {_listed(suspects)} says does not go with the others, as where it is turned by some degrees. "
+        why = f"What {quoted(suspects)} says does not go with the others, as where it is turned by some degrees. "
     text = (
         f"What the robots push {_when(group)} leaves {rms:.2g} N rms that no "
         f"rigid payload explains, {100 * rms / heavy:.0f} % of its weight, and too slow for noise of the sensors. "
         f"{why}The answer is not to be trusted."
     )
     if suspects:
-        where, beside = f"the force sensor of {_listed(suspects)}", ""
+        where, beside = f"the force sensor of {quoted(suspects)}", ""
     else:
         where, beside = (
             "each robot's force sensor",
@@ -151,7 +151,3 @@ def _flat(group: Group, count: int) -> Array:
     power = forces[told] / rows[told, None]
     colour = np.sqrt(power[:-1].max(0) / np.maximum(power[-1], 1e-300))
     return np.asarray((colour < FLAT) & (colour.max() > SLOW))
-
-
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join(f"'{name}'" for name in names)

@@ -36,7 +36,7 @@ OFF = 5.0
 
 def idle(parts: Sequence[Stretch], share: float) -> list[Mask]:
     """Return the rows (T, N) of every recording in which a robot pushes with less than a share of its usual push."""
-    sizes = [_smoothed(part) for part in parts]
+    sizes = [_push(part.wrench[..., 3:], part.rate) for part in parts]
     count = parts[0].seen.shape[1]
     usual = np.zeros(count)
     for i in range(count):
@@ -47,10 +47,6 @@ def idle(parts: Sequence[Stretch], share: float) -> list[Mask]:
         small = (size < share * usual) & part.felt & part.carries
         out.append(np.stack([lasting(small[:, i], IDLE_S * part.rate) for i in range(count)], axis=1))
     return out
-
-
-def _smoothed(part: Stretch) -> Array:
-    return _push(part.wrench[..., 3:], part.rate)
 
 
 def _push(force: Array, rate: float) -> Array:

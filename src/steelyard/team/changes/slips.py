@@ -134,27 +134,12 @@ def alone(residual: Array, J: Array, W: Array) -> Array:
     J (N, 6, 6), W (N, 6) as in the fit, all robots present.
     """
     A = np.linalg.inv(np.einsum("nia,ni,nib->ab", J, W, J))
-    through = np.empty_like(J)
+    out = np.empty_like(residual)
     for i in range(len(J)):
         held = J[i] @ A @ J[i].T * W[i]
         left, value, right = np.linalg.svd(np.eye(6) - held)
         # With two robots in all, what the joint fit shared between them is doubled; nothing is unseen.
-        inverse = right.T @ np.diag(1 / np.maximum(value, 1e-3)) @ left.T
-        through[i] = inverse
-    return _mapped(through, residual)
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _mapped(through: Array, residual: Array) -> Array:
-    """Return every residual (T, N, 6) through its robot's map (N, 6, 6)."""
-    out = np.empty_like(residual)
-    for t in range(out.shape[0]):
-        for i in range(out.shape[1]):
-            for a in range(6):
-                total = 0.0
-                for b in range(6):
-                    total += through[i, a, b] * residual[t, i, b]
-                out[t, i, a] = total
+        out[:, i] = residual[:, i] @ ((left / np.maximum(value, 1e-3)) @ right)
     return out
 
 

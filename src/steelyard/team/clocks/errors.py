@@ -57,6 +57,11 @@ PUNCTUAL = ClockError()
 Errors = Mapping[str, ClockError]
 
 
+def joined(errors: Errors, more: Errors) -> Errors:
+    """Return the errors of stamps that have `more` beside what was put right before."""
+    return {n: errors.get(n, PUNCTUAL) + more.get(n, PUNCTUAL) for n in sorted({*errors, *more})}
+
+
 @dataclass(frozen=True)
 class Step:
     """Stamps of `name` in one recording (its number) that are later by `size` [s] from `at` [s] on."""
@@ -84,9 +89,7 @@ class ClockErrors:
         if not (self and more):
             return more if more else self
         both = zip(self.recordings, more.recordings, strict=True)
-        return ClockErrors(tuple(
-            {n: a.get(n, PUNCTUAL) + b.get(n, PUNCTUAL) for n in sorted({*a, *b})} for a, b in both
-        ))  # fmt: skip
+        return ClockErrors(tuple(joined(before, after) for before, after in both))
 
     def corrected(self, log: TeamLog) -> TeamLog:
         """Return the log with all stamps put right."""

@@ -23,7 +23,7 @@ from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.team.adjoint import turning_speed
 from steelyard.team.changes.presence import LIGHT, perhaps_idle, usual_pushes
-from steelyard.team.clocks.errors import NOTHING, PUNCTUAL, ClockError, ClockErrors, Errors, Step
+from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Errors, Step, joined, punctual
 from steelyard.team.clocks.shifts import LARGEST_S, LEAST_S, LEFT, STEP_S, WIDTH, Split, best_split, costs, lines
 
 # Shifts are looked for up to so many seconds, and a share of the recording; speeds are those over OVER_S.
@@ -78,11 +78,8 @@ def _parts(
         both = all(jump.name in part.tracks for jump in jumps for part in (first, second))
         if both and min(len(first.tracks), len(second.tracks)) > 1:
             more = {jump.name: ClockError(jump.after - jump.before) for jump in jumps}
-            later = [
-                (r, {n: more.get(n, PUNCTUAL) + late.get(n, PUNCTUAL) for n in {*more, *late}})
-                for r, late in _parts(log, second, most - 1, drifts, usual)
-            ]
-            return [*_parts(log, first, most - 1, drifts, usual), *later]
+            before, after = (_parts(log, part, most - 1, drifts, usual) for part in (first, second))
+            return [*before, *((part, joined(more, late)) for part, late in after)]
     found = ((name, pair.drift()) for name, pair in pairs.items() if drifts)
     return [(recording, {name: drift for name, drift in found if drift is not None})]
 
@@ -112,10 +109,9 @@ def cut_at_step(
     cut = [r for k, one in enumerate(log.recordings) for r in ((before, after) if k == step.recording else (one,))]
     known = list(errors.recordings) if errors else [{} for _ in log.recordings]
     more = {name: ClockError(size) for name in moved if name in after.tracks}
-    later = ClockErrors((known[step.recording],)) + ClockErrors((more,))
-    known.insert(step.recording + 1, later.recordings[0])
-    here = [more if k == step.recording + 1 else {} for k in range(len(cut))]
-    return ClockErrors(tuple(here)).corrected(log.with_recordings(*cut)), ClockErrors(tuple(known))
+    known.insert(step.recording + 1, joined(known[step.recording], more))
+    cut[step.recording + 1] = punctual(after, more)
+    return log.with_recordings(*cut), ClockErrors(tuple(known))
 
 
 def _alike(jump: Jump, others: Iterable[Jump | None]) -> Iterator[Jump]:

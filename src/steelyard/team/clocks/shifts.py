@@ -61,7 +61,11 @@ def best_split(x: Array, y: Array, common: int, most: int) -> Split | None:
     ends = round(LEAST_S / BIN_S)
     if len(x) * STEP_S < 2 * (LEAST_S + LARGEST_S) + BIN_S:
         return None
-    cost, inner = known_costs(x, y, most, WIDTH), x[most:-most]
+    cost, inner = costs(x, y, most, WIDTH), x[most:-most]
+    # Bins in which any shift meets a speed that is not known tell nothing.
+    cost[:, ~np.isfinite(cost).all(0)] = 0.0
+    known = inner[np.isfinite(inner)]
+    varied = float(((known - known.mean()) ** 2).sum()) if len(known) else 0.0
     least = 1e-12 * float(np.nansum(inner**2)) + 1e-300
     sums = np.cumsum(cost, axis=1)
     rest = sums[:, -1:] - sums
@@ -71,22 +75,9 @@ def best_split(x: Array, y: Array, common: int, most: int) -> Split | None:
     before, after = (STEP_S * (k - most + common) for k in (i, j))
     return Split(
         STEP_S * begin + BIN_S * (at + 1), before, after,
-        (one + two) / (_varied(inner) + least),
+        (one + two) / (varied + least),
         min(sums[j, at] / one, rest[i, at] / two), one + two, cost,
     )  # fmt: skip
-
-
-def _varied(speed: Array) -> float:
-    """Return by how much a speed (T,) varies, the sum of squares about its mean, where it is known."""
-    known = speed[np.isfinite(speed)]
-    return float(((known - known.mean()) ** 2).sum()) if len(known) else 0.0
-
-
-def known_costs(x: Array, y: Array, most: int, width: int) -> Array:
-    """Return `costs`, zero in bins in which any shift meets a speed that is not known."""
-    cost = costs(x, y, most, width)
-    cost[:, ~np.isfinite(cost).all(0)] = 0.0
-    return cost
 
 
 @njit(cache=True)

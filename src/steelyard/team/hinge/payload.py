@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, quoted
 from steelyard.inertia import InertialParameters
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import exp
@@ -184,11 +184,8 @@ def _normal(part: Bands, kind: Kind, W: Array, sums: Sums) -> Normal:
     return Normal(S[:wide, :wide], S[:wide, -1], noise, float(S[-1, -1]), each)
 
 
-# Seven parameters of the whole in its ten: first moments across the hinge, second moments of mass, products.
-FROM_TEN = np.zeros((SECOND, WHOLE))
-FROM_TEN[0, 1] = FROM_TEN[1, 2] = FROM_TEN[4, 5] = FROM_TEN[5, 6] = FROM_TEN[6, 8] = 1.0
-FROM_TEN[2, [4, 7, 9]] = -0.5, 0.5, 0.5
-FROM_TEN[3, [4, 7, 9]] = 0.5, -0.5, 0.5
+# Of ten parameters, the seven that the hinge shows, and mass, first and second moment along it, which it does not.
+FROM_TEN, FROM_ALONG = np.split(np.linalg.inv(np.column_stack([SEVEN, EXCHANGED])), [SECOND])
 # Difference quotients of the least mass are taken over this share of its standard deviations.
 SLIGHT = 1e-3
 
@@ -223,12 +220,6 @@ def seen_from(ten: Array) -> Array:
     steps = SLIGHT**2 * np.eye(6)
     sides = [InertialParameters(ten).in_frame(exp(sign * steps)).vector for sign in (-1, 1)]
     return np.asarray((sides[0] - sides[1]).T / (2 * SLIGHT**2))
-
-
-# Mass, first and second moment along the hinge of ten parameters.
-FROM_ALONG = np.zeros((3, WHOLE))
-FROM_ALONG[0, 0] = FROM_ALONG[1, 3] = 1.0
-FROM_ALONG[2, [4, 7, 9]] = 0.5, 0.5, -0.5
 
 
 def seven_rows() -> tuple[Array, Array]:
@@ -285,7 +276,7 @@ def hinge_findings(team: TeamEstimate) -> list[Finding]:
     if team.hinge is None:
         return []
     hinge = team.hinge
-    holders = [" and ".join(f"'{name}'" for name in body.robots) for body in hinge.bodies]
+    holders = [quoted(body.robots) for body in hinge.bodies]
     said = hinge_words(holders, hinge.axis, hinge.point, hinge.swing, team.reference)
     said += " What is given is for both together with the hinge at the mean of its angles. "
     if np.isnan([body.mass_range[0] for body in hinge.bodies]).any():

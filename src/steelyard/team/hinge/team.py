@@ -42,7 +42,7 @@ from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.solver import OWN
 from steelyard.team.poses.team import FEW_ROWS, mean_gravity
 from steelyard.team.split import Split
-from steelyard.team.stacked import Stretch, row_slices, stretches
+from steelyard.team.stacked import Stretch, stretches, with_rows
 
 # Rows that are enough to come near the optimum.
 ROUGH_ROWS = 200
@@ -84,15 +84,14 @@ def fit_two_bodies(log: TeamLog, split: Split, clocks: bool) -> tuple[tuple[Stre
 
 def _speeds(parts: tuple[Stretch, ...], team: Hinged) -> Array:
     """Return how motion and angle change (T, 7), recording by recording."""
-    each = zip(parts, row_slices(parts), strict=True)
-    return np.concatenate([rates(team.rows(rows), part.rate) for part, rows in each])
+    return np.concatenate([rates(team.rows(rows), part.rate) for part, rows in with_rows(parts)])
 
 
 def _places(before: tuple[Stretch, ...], after: tuple[Stretch, ...]) -> Integers:
     """Return which row of `before` is nearest to each of `after`, recording by recording."""
     middles = [(part.time[1:] + part.time[:-1]) / 2 for part in before]
-    each = zip(middles, after, row_slices(before), strict=True)
-    return np.concatenate([rows.start + np.searchsorted(middle, now.time) for middle, now, rows in each])
+    each = zip(middles, after, with_rows(before), strict=True)
+    return np.concatenate([rows.start + np.searchsorted(middle, now.time) for middle, now, (_, rows) in each])
 
 
 def identify_two_bodies(
@@ -202,7 +201,7 @@ def _kinds(
     Raises CannotAnswer where there are none.
     """
     gravity, made = mean_gravity(log, fit.team.homes), []
-    for part, rows in zip(parts, row_slices(parts), strict=True):
+    for part, rows in with_rows(parts):
         team = fit.team.rows(rows)
         made.append((team, fit.residual[rows], *bodies_of(part, team, gravity, highest_hz)))
     wrong, turned = robot_of_other_sign([(team, one, two) for team, _, one, two in made], sums, log.names, highest_hz)
@@ -314,7 +313,7 @@ def first_hinged(
     for i in second[1:]:
         # Grasps of the second body hang together better than each with the first.
         made[i] = made[one] @ from_twists(twist[:, one], twist[:, i])
-    grasps = Pose.from_matrix(np.array([pose.matrix() for pose in made]))
+    grasps = Pose.stacked(made)
     held = np.zeros(count, np.bool_)
     held[list(second)] = True
     rows = data.valid[:, reference]
@@ -326,7 +325,7 @@ def first_hinged(
             every = (measured[both] @ grasps[i]) @ data.poses[both, i].inverse()
             turn = Rotation.nearest(every.rotation.matrix.mean(0))
             homes[i] = Pose(turn, every.position.mean(0))
-    place = Pose.from_matrix(np.array([home.matrix() for home in homes]))
+    place = Pose.stacked(homes)
     first = [i for i in range(count) if not held[i]]
     seer = np.array(first)[np.argmax(data.valid[:, first], axis=1)]
     motion = place[seer] @ data.poses[np.arange(len(seer)), seer] @ grasps[seer].inverse()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array, Mask
-from steelyard.findings import Finding, percent
+from steelyard.findings import Finding, percent, quoted
 from steelyard.inertia.regressor import basis
 from steelyard.team.misread.readings import AXES, FACTORS, READINGS, SIGN, Reading, torques_beside
 from steelyard.team.misread.signs import sign_finding
@@ -258,7 +258,7 @@ def _finding(name: str, reading: Reading, score: float) -> Finding:
 def _undecided(equal: Sequence[tuple[int, int]], names: Sequence[str]) -> Finding:
     """Return the finding of forces that fit with more than one reading."""
     who = list(dict.fromkeys(robot for robot, _ in equal))
-    robots = " or ".join(f"'{names[robot]}'" for robot in who)
+    robots = quoted((names[robot] for robot in who), " or ")
     ways = [f"those of '{names[robot]}' as {Reading(number, np.eye(3)).words()}" for robot, number in equal[:3]]
     text = (
         f"What robots push does not fit one body as given, and would with the forces of {robots} read otherwise: "

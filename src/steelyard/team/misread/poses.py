@@ -18,6 +18,7 @@ import numpy as np
 
 from steelyard.check import FAILURES, Array
 from steelyard.errors import BadValue
+from steelyard.findings import quoted
 from steelyard.logs.misread import MISREAD
 from steelyard.logs.recording import INCH
 from steelyard.logs.team_log import TeamLog
@@ -292,7 +293,7 @@ def require_own_files(log: TeamLog) -> None:
     if best is None or float(np.log(as_given.noise / noise).mean()) < np.log(EXCHANGE_CLOSES):
         return
     number, (i, j) = best
-    where = " or ".join(f"'{part.name}'" for part in (parts if len(parts) == 2 else parts[number : number + 1]))
+    where = quoted((part.name for part in (parts if len(parts) == 2 else parts[number : number + 1])), " or ")
     raise BadValue(
         f"the files of '{names[i]}' and '{names[j]}' look exchanged in {where}: with each in the other's place, "
         f"what robots say of their poses differs by {in_words(noise)}, as given by {in_words(as_given.noise)}. "

@@ -7,16 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.inertia.regressor import basis
 from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.payload.body_rows import summing
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.gain_sight import gain_columns
 from steelyard.team.payload.model import Group, scatter
-from steelyard.team.payload.spectra import Spectra
-
-# The features of the motion and the one of a bias among all that `Spectra` scatters.
-SEEN = np.array([*range(12), -1])
+from steelyard.team.payload.spectra import regressors
 
 
 def moved_by_pushes(fit: PayloadFit, D: Array) -> Array:
@@ -64,7 +60,7 @@ def moved_by(fit: PayloadFit, changes: Array) -> Array:
     right = np.zeros((kinds * count, 10 + len(fit.levers)))
     for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
         for part, blind in zip(group.parts, blinds, strict=True):
-            for W, S in zip(weights, _seen(fit, part), strict=True):
+            for W, S in zip(weights, part.seen(len(fit.levers) > 0), strict=True):
                 pushes = S[:, 12 : 12 + 6 * count].reshape(-1, count, 6).transpose(1, 2, 0)
                 change = flat @ pushes
                 seen = (W @ _levers(fit, blind)).reshape(right.shape[1], -1)
@@ -80,7 +76,7 @@ def moved_by_gains(fit: PayloadFit, D: Array) -> Array:
         for part, blind in zip(group.parts, blinds, strict=True):
             S = part.scatter
             mean = S[:, :, -1].sum(0) / max(float(S[:, -1, -1].sum()), 1e-300)
-            seen = _seen(fit, part)
+            seen = part.seen(len(fit.levers) > 0)
             varying = seen[:, :, 12 + force] - seen[:, :, S.shape[2] - 1, None] * mean[12 + force]
             turned = np.einsum("kau,kxu->axu", weights @ unit, varying)
             each.append(back @ _levers(fit, blind).reshape(back.shape[1], -1) @ turned.reshape(-1, len(force)))
@@ -101,19 +97,9 @@ def weight_by_gains(groups: Sequence[Group], D: Array) -> float:
     return float(np.linalg.norm(whole @ pushed) / max(float(whole @ whole), 1e-300))
 
 
-def _seen(fit: PayloadFit, part: Spectra) -> Array:
-    """Return the scatter (K, 13 + Q, Z) of the features by which a wrench tells the parameters with all that is there.
-
-    Q  of what stands still in the room, where the fit allows for biases there
-    """
-    S = part.scatter[:, SEEN]
-    return np.concatenate([S, part.room[..., : S.shape[2]]], axis=1) if len(fit.levers) else S
-
-
 def _levers(fit: PayloadFit, blind: Array) -> Array:
-    """Return what the wrench of a row with these features says of the parameters (P, 6, 13 + Q) beside its bias."""
-    out = np.zeros((len(blind), 6, len(SEEN) + fit.levers.shape[2]))
-    out[:10, :, :12], out[10:, :, len(SEEN) :] = basis(), fit.levers
+    """Return what the wrench of a row with `Spectra.seen` says of the parameters (P, 6, 13 + Q) beside its bias."""
+    out = regressors(fit.levers)[: len(blind)]
     out[:, :, 12] = -blind
     return out
 

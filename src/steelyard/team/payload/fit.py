@@ -25,10 +25,10 @@ from steelyard.team.payload.model import (
     Group,
     Normal,
     least_noise,
-    normal,
     residual_scatter,
     units_of_body,
 )
+from steelyard.team.payload.spectra import NO_LEVERS
 from steelyard.team.stacked import row_slices
 
 # With two robots, whose moment is balanced through the payload alone, it takes up to nine.
@@ -72,7 +72,7 @@ class PayloadFit:
     residual: Array
     chi2: float
     unsure: float = 1.0
-    levers: Array = field(default_factory=lambda: np.zeros((0, 6, 0)))
+    levers: Array = field(default_factory=lambda: NO_LEVERS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +128,7 @@ class _Equations:
         return group.weights(phi)
 
     def normals(self, group: Group, W: Array) -> list[Normal]:
-        beside = group.wrench_noise if group.sighted else None
-        return [normal(part, self.D, W, group.motion_noise, beside) for part in group.parts]
+        return group.normals(self.D, W)
 
     def judged(self, group: Group, W: Array, beside: Recordings, start: int) -> Group:
         """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""
@@ -160,18 +159,13 @@ class _Equations:
 def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tuple[Group, ...]]:
     """Return phi by least squares with moments in units of force times size, and the noise that is then left."""
     unit = np.concatenate([np.full(3, size**2), np.ones(3)])
-    loud = tuple(
-        replace(g, motion_noise=np.zeros_like(g.motion_noise), wrench_noise=np.tile(unit, (len(g.wrench_noise), 1)))
-        for g in groups
-    )
-    weight = np.linalg.inv(np.diag(unit))[None]
-    every = [
-        normal(part, D, np.repeat(weight, len(g.wrench_noise), 0), g.motion_noise) for g in loud for part in g.parts
-    ]
+    blind = tuple(replace(g, motion_noise=np.zeros_like(g.motion_noise), sighted=False) for g in groups)
+    weight = np.linalg.inv(np.diag(unit))
+    every = [one for g in blind for one in g.normals(D, np.tile(weight, (len(g.wrench_noise), 1, 1)))]
     flat = units_of_body(1.0, size)
     first = Models.of(every, np.diag(unit), np.array([[0.0, 1.0, 0.0, 0.0]]), flat).recordings(0)
     left, count = np.zeros(6), 0.0
-    for k, part in enumerate(part for group in loud for part in group.parts):
+    for k, part in enumerate(part for group in groups for part in group.parts):
         left += residual_scatter(part, D, first.solution(k), np.zeros((16, 16))).sum(0)
         count += float(part.judged_rows.sum())
     phi = first.phi

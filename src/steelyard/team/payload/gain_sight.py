@@ -14,9 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
-from steelyard.inertia.regressor import basis
 from steelyard.team.definite import shown_axes
-from steelyard.team.payload.spectra import Spectra
+from steelyard.team.payload.spectra import Spectra, regressors
 
 # What changes by so many times the power of its noise counts: of a band, with all the sum's noise on each axis, and of
 # a combination of axes.
@@ -58,7 +57,7 @@ class GainSight:
         return np.where(told, values, 0.0), axes, np.where(told, axes.T @ self.right, 0.0)
 
 
-def gain_sight(part: Spectra, D: Array, W: Array, noise: Array, levers: Array | None = None) -> GainSight:
+def gain_sight(part: Spectra, D: Array, W: Array, noise: Array, levers: Array) -> GainSight:
     """Return what one recording says of its gains.
 
     D  (6, 6 N) sums the pushes at B     W  (K, 6, 6) weights     noise  (K, 6) of the summed wrench
@@ -72,14 +71,13 @@ def gain_sight(part: Spectra, D: Array, W: Array, noise: Array, levers: Array | 
         return GainSight.none(len(axes))
     S, W, rows, each = part.scatter[bands], W[bands], part.rows[bands], each[bands]
     inside, last = S.shape[1], S.shape[1] - 1
-    if levers is not None:
+    if len(levers):
         room = part.room[bands]
         S = np.concatenate([np.concatenate([S, room[..., :inside].swapaxes(1, 2)], axis=2), room], axis=1)
-    beside = 16 + (0 if levers is None else len(levers))
+    known = regressors(levers)
+    beside = len(known)
     T = np.zeros((beside + len(axes), 6, S.shape[1]))
-    T[:10, :, :12], T[10:16, :, last] = basis(), np.eye(6)
-    if levers is not None:
-        T[16:beside, :, inside:] = levers
+    T[:beside, :, :12], T[:beside, :, last:] = known[..., :12], known[..., 12:]
     T[np.arange(beside, len(T)), :, axes] = unit.T
     K = np.zeros((6, S.shape[1]))
     K[:, 12:last] = D
@@ -89,8 +87,8 @@ def gain_sight(part: Spectra, D: Array, W: Array, noise: Array, levers: Array | 
     own = 3 * each * rows / len(axes)
     noisy = (unit * (np.tensordot(own, W, 1) @ unit)).sum(0)
     g[beside:] -= noisy
-    axes_beside, known = shown_axes(H[:beside, :beside], RANK)
-    held = axes_beside / np.sqrt(known)
+    axes_beside, values = shown_axes(H[:beside, :beside], RANK)
+    held = axes_beside / np.sqrt(values)
     blind = H[beside:, :beside] @ held
     return _loud(H[beside:, beside:] - blind @ blind.T, g[beside:] - blind @ (held.T @ g[:beside]), noisy)
 

@@ -18,13 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.inertia.regressor import basis
 from steelyard.spatial import cross_matrix
 from steelyard.team.payload.bias_models import Models, ladder_of, shares
 from steelyard.team.payload.fit import PayloadFit
-from steelyard.team.payload.gain_sight import gain_sight
 from steelyard.team.payload.model import Normal
-from steelyard.team.payload.spectra import Spectra
 from steelyard.team.stacked import row_slices
 
 # [N] the sizes that are tried; none at all is beforehand so many times as likely as any of them.
@@ -103,7 +100,9 @@ def with_home_bias(
     if not len(places):
         return fit, 0.0
     levers, plain = home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3), fit.normals
-    wide, scale = _wide(fit, D, levers), np.concatenate([fit.scale, np.ones(len(levers))])
+    each = zip(fit.groups, fit.weights, strict=True)
+    wide = [one for group, weights in each for one in group.normals(D, weights, levers)]
+    scale = np.concatenate([fit.scale, np.ones(len(levers))])
 
     def tried(ladder: Array, sizes: Array) -> _Tried:
         none = Models.of(plain, C, ladder, fit.scale)
@@ -121,17 +120,6 @@ def with_home_bias(
     return fit, 0.0
 
 
-def _wide(fit: PayloadFit, D: Array, levers: Array) -> list[Normal]:
-    """Return the equations of every recording in [phi (10), u (U,), bias (6)] with the weights of a fit."""
-    out: list[Normal] = []
-    for group, weights in zip(fit.groups, fit.weights, strict=True):
-        for part in group.parts:
-            given = fit.normals[len(out)]
-            gains = gain_sight(part, D, weights, group.wrench_noise, levers) if group.sighted else given.gains
-            out.append(replace(beside_home(given, part, D, weights, levers), gains=gains))
-    return out
-
-
 def home_levers(places: Array, axes: int) -> Array:
     """Return the wrench E (U, 6, 3 axes) at B that each unit of u makes of what stands still in the room.
 
@@ -144,24 +132,6 @@ def home_levers(places: Array, axes: int) -> Array:
         out[k, :, :3, k] = cross_matrix(columns[:, 1:])
         out[k, :, 3:, k] = columns[:, :1, None] * np.eye(3)
     return out.reshape(-1, 6, 3 * axes)
-
-
-def beside_home(plain: Normal, part: Spectra, D: Array, W: Array, levers: Array) -> Normal:
-    """Return the normal equations of one recording in [phi (10), u (U,), bias (6)]; W (K, 6, 6)."""
-    count, width = len(levers), part.scatter.shape[-1]
-    H, g = np.zeros((16 + count, 16 + count)), np.zeros(16 + count)
-    old, new = np.r_[:10, 10 + count : 16 + count], np.arange(10, 10 + count)
-    H[np.ix_(old, old)], g[old] = plain.H, plain.g
-    # Levers at their weights times the rows of every band, (U, 6, Z + Q).
-    seen = ((W[:, None] @ levers).reshape(len(W), -1, levers.shape[2]) @ part.room).sum(0).reshape(count, 6, -1)
-    H[np.ix_(new, new)] = seen[..., width:].reshape(count, -1) @ levers.reshape(count, -1).T
-    H[new, :10] = seen[..., :12].reshape(count, -1) @ basis().reshape(10, -1).T
-    H[new, 10 + count :] = seen[..., width - 1]
-    H[:10, new], H[10 + count :, new] = H[new, :10].T, H[new, 10 + count :].T
-    g[new] = seen[..., 12 : width - 1].reshape(count, -1) @ D.ravel()
-    noise = np.zeros((10 + count, 10 + count))
-    noise[:10, :10] = plain.noise
-    return replace(plain, H=H, g=g, noise=noise)
 
 
 def _held(normals: Sequence[Normal], size: float) -> list[Normal]:

@@ -18,10 +18,10 @@ from typing import NamedTuple
 import numpy as np
 
 from steelyard.check import Array, Mask
-from steelyard.inertia.regressor import basis, motion_map
+from steelyard.inertia.regressor import motion_map
 from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.payload.gain_sight import GainSight, gain_columns, gain_sight, of_force
-from steelyard.team.payload.spectra import Spectra
+from steelyard.team.payload.spectra import NO_LEVERS, SEEN, Spectra, regressors
 
 # Noise is never judged smaller than this share of what the payload weighs: no force sensor resolves it.
 ROUNDING = 1e-6
@@ -64,12 +64,16 @@ class Group:
         noise[:, range(6), range(6)] += self.wrench_noise
         return np.asarray(np.linalg.inv(noise))
 
+    def normals(self, D: Array, W: Array, levers: Array = NO_LEVERS) -> list[Normal]:
+        """Return the normal equations of every recording in [phi (10), u (U,), bias (6)]; D, W and levers as below."""
+        return [_normal(part, D, W, self, levers) for part in self.parts]
+
 
 @dataclass(frozen=True, eq=False)
 class Normal:
-    """Normal equations of one recording in [phi (10), bias (6)].
+    """Normal equations of one recording in P parameters, [phi (10), u (U,)], and its bias (6).
 
-    H, g      of what was measured          noise  (10, 10) what the motion's noise adds to H on average
+    H, g      of what was measured          noise  (P, P) what the motion's noise adds to H on average
     constant  the weighted square of the wrench     pulls  (6, 3 N) bias per gain of every force axis
     gains     what changes of the forces say of these gains, where that was asked
     """
@@ -98,45 +102,36 @@ def unit_bias(D: Array, six_axis: Mask, size: float) -> Array:
     return np.asarray(out)
 
 
-def normal(part: Spectra, D: Array, W: Array, motion_noise: Array, wrench_noise: Array | None = None) -> Normal:
-    """Return the normal equations of one recording from its scatter; W (K, 6, 6).
+def _normal(part: Spectra, D: Array, W: Array, group: Group, levers: Array) -> Normal:
+    """Return the normal equations of one recording from its scatter.
 
-    wrench_noise  (K, 6) as of `Group`, where gains are asked
+    D  (6, 6 N) sums the pushes at B     W  (K, 6, 6) weights     levers  (U, 6, Q) of biases that stand in the room
     """
-    E = basis()
-    S = part.scatter
-    H, g = np.zeros((16, 16)), np.zeros(16)
-    WE = W[:, None] @ E
-    flat = E.reshape(10, -1)
-    H[:10, :10] = (WE @ S[:, None, :12, :12]).sum(0).reshape(10, -1) @ flat.T
-    H[:10, 10:] = np.einsum("kpix,kx->pi", WE, S[:, :12, -1])
-    H[10:, 10:] = np.einsum("kij,k->ij", W, S[:, -1, -1])
-    H[10:, :10] = H[:10, 10:].T
-    to_wrench = S[:, :, 12:-1] @ D.T
-    g[:10] = np.einsum("kpix,kxi->p", WE, to_wrench[:, :12])
-    g[10:] = np.einsum("kij,kj->i", W, to_wrench[:, -1])
-    constant = float(np.einsum("kij,kji->", W, D @ to_wrench[:, 12:-1]))
-    first = E[:, :, :6].reshape(10, -1)
-    noise = ((WE[..., :6] @ motion_noise[:, None]) * part.rows[:, None, None, None]).sum(0).reshape(10, -1) @ first.T
+    S, seen, T = part.scatter, part.seen(len(levers) > 0), regressors(levers)
+    width, count = S.shape[2], len(T) - 6
+    features = np.concatenate([seen[..., :12], seen[..., width - 1 :]], axis=2)
+    WT = W[:, None] @ T
+    H = (WT.reshape(len(W), -1, T.shape[2]) @ features).sum(0).reshape(len(T), -1) @ T.reshape(len(T), -1).T
+    g = np.einsum("kpix,kxi->p", WT, seen[..., 12 : width - 1] @ D.T)
+    constant = float(np.einsum("kij,kji->", W, D @ (S[:, 12:-1, 12:-1] @ D.T)))
+    moved = WT[:, :count, :, :6].reshape(len(W), -1, 6) @ (part.rows[:, None, None] * group.motion_noise)
+    noise = moved.sum(0).reshape(count, -1) @ T[:count, :, :6].reshape(count, -1).T
     force, unit = gain_columns(D)
     total = S.sum(0)
     mean = total[12 + force, -1] / max(float(total[-1, -1]), 1e-300)
-    gains = GainSight.none(len(force)) if wrench_noise is None else gain_sight(part, D, W, wrench_noise)
-    return Normal(H, g, noise, constant, unit * mean, gains)
+    sight = gain_sight(part, D, W, group.wrench_noise, levers) if group.sighted else GainSight.none(len(force))
+    return Normal(H, g, noise, constant, unit * mean, sight)
 
 
 def residual_scatter(part: Spectra, D: Array, solution: Array, covariance: Array) -> Array:
     """Return the expected scatter (K, 6) of the noise given [phi, bias] (16,) with covariance: residual and doubt."""
-    T = np.zeros((16, 6, 13))
-    T[:10, :, :12] = basis()
-    T[10:, :, -1] = np.eye(6)
+    T = regressors(NO_LEVERS)
     K = np.zeros((6, part.judged.shape[1]))
     K[:, 12:-1] = D
     slope = np.tensordot(solution, T, axes=1)
     K[:, :12], K[:, -1] = -slope[:, :12], -slope[:, 12]
     out = np.einsum("kix,ix->ki", K @ part.judged, K)
-    inner = np.concatenate([np.arange(12), [part.judged.shape[1] - 1]])
-    motion = part.judged[:, inner[:, None], inner]
+    motion = part.judged[:, SEEN[:, None], SEEN]
     flat = T.transpose(1, 2, 0).reshape(-1, 16)
     doubt = (flat @ covariance @ flat.T).reshape(6, 13, 6, 13)
     return np.asarray(out + np.einsum("ixiy,kxy->ki", doubt, motion))

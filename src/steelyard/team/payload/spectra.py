@@ -18,6 +18,7 @@ import numpy as np
 from scipy.fft import dct
 
 from steelyard.check import Array, Integers
+from steelyard.inertia.regressor import basis
 from steelyard.spatial import cross_matrix
 from steelyard.team.payload.body_rows import BodyRows, Run, slope
 
@@ -25,6 +26,10 @@ from steelyard.team.payload.body_rows import BodyRows, Run, slope
 ROWS, RATIO = 30, 1.35
 # Share of a run, and seconds, over which it is faded in and out: the shorter.
 FADE_SHARE, FADE_S = 0.1, 1.0
+# Motion and constant among all that is scattered: by these, and what stands still in the room, a wrench tells a body.
+SEEN = np.array([*range(12), -1])
+# Levers (U, 6, Q) of no biases that stand still in the room.
+NO_LEVERS = np.zeros((0, 6, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +53,25 @@ class Spectra:
     judged_rows: Array
     samples: int
     hz: Array
+
+    def seen(self, room: bool) -> Array:
+        """Return the scatter (K, 13 + Q, Z + Q) of [motion, 1, room] with all that is there; Q = 0 without `room`."""
+        own = self.scatter[:, SEEN]
+        if not room:
+            return own
+        beside = self.room[..., : own.shape[2]][..., SEEN].swapaxes(1, 2)
+        return np.concatenate([np.concatenate([own, beside], axis=2), self.room], axis=1)
+
+
+def regressors(levers: Array) -> Array:
+    """Return the wrench (P + 6, 6, 13 + Q) that each of [phi (10), u (U,), bias (6)] makes of [motion, 1, room].
+
+    levers  (U, 6, Q) of biases u that stand still in the room
+    """
+    count, width = len(levers), levers.shape[2]
+    out = np.zeros((16 + count, 6, len(SEEN) + width))
+    out[:10, :, :12], out[10:-6, :, len(SEEN) :], out[-6:, :, 12] = basis(), levers, np.eye(6)
+    return out
 
 
 def fade(rows: int, rate: float) -> Array:

@@ -69,7 +69,7 @@ class Rows:
         W, inverse, pattern = _weights(data, team, noise)
         turns, places, apart = pose_rows.settled(
             data.poses.rotation.matrix, data.poses.position, data.valid, G.rotation.matrix, G.position,
-            Z.rotation.matrix, Z.position, X.rotation.matrix, X.position, data.twists, team.delays, W, inverse,
+            Z.rotation.matrix, Z.position, X.rotation.matrix, X.position, data.twist, team.delays, W, inverse,
             pattern, sweeps,
         )  # fmt: skip
         apart.flags.writeable = False
@@ -99,7 +99,7 @@ class Rows:
         W, inverse, pattern = _weights(self.data, self.team, noise)
         return pose_rows.pulled(
             self.apart, self.data.valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position,
-            X.rotation.matrix, X.position, self.data.twists, W, inverse, pattern, self.data.shares, rows,
+            X.rotation.matrix, X.position, self.data.twist, W, inverse, pattern, self.data.shares, rows,
         )  # fmt: skip
 
 
@@ -193,7 +193,7 @@ def fit_poses(
     the same rows, if there is one: it decides the way to the optimum, not where that is.
     """
     count = data.count
-    own = np.arange(OWN if data.twist is not None else OWN - 1)
+    own = np.arange(OWN if len(data.twist) else OWN - 1)
     unknown = np.concatenate([OWN * i + (own if i != reference else own[OWN - 1 :]) for i in range(count)])
     timed, near = unknown % OWN == OWN - 1, 0 if noise is not None else NEAR
     team = start

@@ -10,7 +10,7 @@ Source: AX = XB as in hand-eye calibration; the paper's eq. 3-8 are the same wit
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -44,20 +44,19 @@ class TeamMotion:
 
     poses  X_HG (T, N); where not `valid` they hold anything finite
     valid  (T, N) whether the robot has a pose at that time
-    twist  (T, N, 6) of each grasp in its own axes per second that its stamps are late; None where not asked for
+    twist  (T, N, 6) of each grasp in its own axes per second that its stamps are late; none where not asked for
     share  (T,) how much each row counts; None where all count as one
     """
 
     poses: Pose
     valid: Mask
-    twist: Array | None = None
+    twist: Array = field(default_factory=lambda: np.zeros((0, 0, 6)))
     share: Array | None = None
 
     def __post_init__(self) -> None:
         # One layout, one compiled form of what passes over the rows.
         object.__setattr__(self, "valid", np.ascontiguousarray(self.valid))
-        if self.twist is not None:
-            object.__setattr__(self, "twist", np.ascontiguousarray(self.twist))
+        object.__setattr__(self, "twist", np.ascontiguousarray(self.twist))
 
     @classmethod
     def of(cls, parts: Sequence[Stretch]) -> TeamMotion:
@@ -78,13 +77,9 @@ class TeamMotion:
 
     def rows(self, chosen: Any) -> TeamMotion:
         """Return some of the rows."""
-        twist, share = (None if x is None else x[chosen] for x in (self.twist, self.share))
+        twist = self.twist[chosen] if len(self.twist) else self.twist
+        share = None if self.share is None else self.share[chosen]
         return TeamMotion(self.poses[chosen], self.valid[chosen], twist, share)
-
-    @property
-    def twists(self) -> Array:
-        """The twists, or (0, N, 6) where they were not asked for."""
-        return np.zeros((0, self.count, 6)) if self.twist is None else self.twist
 
     @property
     def shares(self) -> Array:
@@ -118,7 +113,7 @@ class TeamMotion:
         """Scatter (25 N, 25 N) of the features of every row per pattern; see `poses.solver`."""
         found, place = self.patterns
         every = [self] if len(found) == 1 else [self.rows(place == k) for k in range(len(found))]
-        return [scatter(r.poses.rotation.matrix, r.poses.position, r.twists, r.valid, r.share) for r in every]
+        return [scatter(r.poses.rotation.matrix, r.poses.position, r.twist, r.valid, r.share) for r in every]
 
 
 def in_words(noise: Array) -> str:

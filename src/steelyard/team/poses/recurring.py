@@ -22,7 +22,7 @@ from steelyard.check import Array
 from steelyard.logs.autocorrelation import correlation_time
 from steelyard.team.poses.fit import PoseFit, Rows
 from steelyard.team.poses.solver import OWN
-from steelyard.team.stacked import Stretch, row_slices
+from steelyard.team.stacked import Stretch, with_rows
 
 # Rows that are enough for what is slow, and the least there must be.
 ROWS, FEWEST = 400, 40
@@ -115,7 +115,7 @@ def shares_at_rest(parts: Sequence[Stretch], fit: PoseFit) -> Array | None:
     if rows < REST_ROWS or all(rest):
         return None
     resting, moving = list[float](), list[float]()
-    for part, own, still in zip(parts, row_slices(parts), rest, strict=True):
+    for (part, own), still in zip(with_rows(parts), rest, strict=True):
         left = (fit.rows.residual[own] / np.repeat(fit.noise, 3, axis=1))[part.seen.all(1)]
         if len(left) >= rows / 2:
             pieces = 1 if still else max(1, len(left) // rows)

@@ -25,7 +25,7 @@ from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.poses.measured import ENOUGH, Team, TeamMotion, first_team
 from steelyard.team.poses.recurring import shares_at_rest
-from steelyard.team.stacked import Stretch, row_slices, stretches
+from steelyard.team.stacked import Stretch, stretches, with_rows
 
 # Clocks that were moved are moved until they stand still to this [s]: a step of 10 ms depends by a microsecond on who
 # is the reference, and by where noisy rows are then read the answer does in its sixth digit.
@@ -95,16 +95,15 @@ class PoseTeam(MotionFit):
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
-        slope = (self.fit.rows.data.twists[rows] for rows in row_slices(self.parts))
+        slope = (self.fit.rows.data.twist[rows] for _, rows in with_rows(self.parts))
         return clock_errors(log, self._left(), slope, self.J, self.W)
 
     def _left(self) -> list[tuple[Stretch, Array]]:
-        every = zip(self.parts, row_slices(self.parts), strict=True)
-        return [(part, self.fit.rows.residual[rows]) for part, rows in every]
+        return [(part, self.fit.rows.residual[rows]) for part, rows in with_rows(self.parts)]
 
     def _left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
-        every = zip(stretches(log, self.late), row_slices(self.parts), strict=True)
-        return [(raw, self._residuals(raw, rows.start)) for raw, rows in every]
+        every = zip(stretches(log, self.late), with_rows(self.parts), strict=True)
+        return [(raw, self._residuals(raw, rows.start)) for raw, (_, rows) in every]
 
     def _slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
         return slip_between(parts, apart)
@@ -163,9 +162,9 @@ class PoseTeam(MotionFit):
         noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", self.J, self.W, self.J))
         noise = adjoint_inverse(frame) @ noise @ adjoint_inverse(frame).T
         out = []
-        for (part, left), rows in zip(self._left(), row_slices(self.parts), strict=True):
-            path = fit.team.motion[rows] @ frame
-            out.append((from_poses(part, path, np.asarray(part.seen.any(1)), gravity, highest_hz), left))
+        for part, rows in with_rows(self.parts):
+            body = from_poses(part, fit.team.motion[rows] @ frame, np.asarray(part.seen.any(1)), gravity, highest_hz)
+            out.append((body, fit.rows.residual[rows]))
         return out, noise
 
 
@@ -181,7 +180,7 @@ def _twists(parts: tuple[Stretch, ...], team: Team) -> Array:
     At the ends of recordings, where only one side is known, it stays zero.
     """
     J, out = adjoint_inverse(team.grasps), []
-    for part, rows in zip(parts, row_slices(parts), strict=True):
+    for part, rows in with_rows(parts):
         motion = team.motion[rows]
         half = max(1, round(0.05 * part.rate))
         twist = np.zeros((len(part), 6))

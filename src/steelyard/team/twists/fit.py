@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from steelyard.check import Array, Integers, Mask
 from steelyard.spatial import Pose
@@ -74,14 +73,14 @@ def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...], level
         quiet = np.abs(np.log(new / noise)).max() < EXACT.noise
         noise = new
         H, g, floor = _normal(merged, grasps, noise)
-        step = _step(H, g, floor, unknown)
+        inverse, lost = _shown(H, floor, unknown)
+        step = inverse @ g[unknown]
         gained = max(float(step @ g[unknown]), 0.0)
         if quiet and gained < EXACT.chi2:
             break
         full = np.zeros(6 * data.count)
         full[unknown] = step
         grasps = grasps @ exp(full.reshape(-1, 6))
-    inverse, lost = _shown(H, floor, unknown)
     factor = np.sqrt(_inflation(data, grasps, noise, H + floor, unknown))
     size = factor[(unknown % 6) // 3]
     covariance = inverse @ ((H + floor)[np.ix_(unknown, unknown)] * np.outer(size, size)) @ inverse
@@ -175,17 +174,6 @@ def contracted(P: Array, S: Array, places: Integers, signs: Array) -> Array:
     return out
 
 
-def _step(H: Array, g: Array, floor: Array, unknown: Array) -> Array:
-    """Return the step in the unknown parameters, in the directions that are shown."""
-    inner = H[np.ix_(unknown, unknown)]
-    try:
-        # All are shown where the information exceeds SHOWN^2 times that of noise along every direction.
-        np.linalg.cholesky(inner - SHOWN**2 * floor[np.ix_(unknown, unknown)])
-        return np.asarray(cho_solve(cho_factor(inner, lower=True), g[unknown]))
-    except LinAlgError:
-        return np.asarray(_shown(H, floor, unknown)[0] @ g[unknown])
-
-
 def _shown(H: Array, floor: Array, unknown: Array) -> tuple[Array, Array]:
     """Return the inverse and the lost directions of the unknown steps.
 
@@ -195,7 +183,7 @@ def _shown(H: Array, floor: Array, unknown: Array) -> tuple[Array, Array]:
     try:
         np.linalg.cholesky(H - SHOWN**2 * floor)
         return np.asarray(np.linalg.inv(H)), np.zeros((len(unknown), 0))
-    except LinAlgError:
+    except np.linalg.LinAlgError:
         root = np.linalg.cholesky(floor + 1e-12 * np.diag(np.diag(floor) + 1e-300))
     back = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(back @ H @ back.T)

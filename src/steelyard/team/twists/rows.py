@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
+from steelyard.findings import quoted
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_rows import channel_at
 from steelyard.logs.team_track import Track
@@ -72,7 +73,7 @@ def _no_twists(log: TeamLog) -> str:
     """Return what to give where nobody has twists, and not all have poses in a base that stands still."""
     still = [robot.name for robot in log.robots if robot.base == "still"]
     posed = {name for name in still for _, track in log.tracks_of(name) if track.has("rotation", "position")}
-    placeless = ", ".join(f"'{name}'" for name in still if name not in posed)
+    placeless = quoted((name for name in still if name not in posed), ", ")
     if placeless:
         return (
             f"no recording of {placeless} has both rotation and position: give them, or angular_velocity and "

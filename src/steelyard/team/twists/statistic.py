@@ -118,19 +118,15 @@ def first_grasps(data: TwistScatter, reference: int, names: tuple[str, ...], lev
 
     Raises CannotAnswer where a robot never spoke together with the reference.
     """
-    turns, places = [], []
+    grasps = [Pose.identity()] * data.count
     for i in range(data.count):
         if i == reference:
-            turns.append(np.eye(3))
-            places.append(np.zeros(3))
             continue
         S = data.pair(reference, i)
         if not S.any():
             raise CannotAnswer(_never_together(data, reference, i, names))
-        R, p = _pair(S, np.zeros((3, 3)) if level is None else level[i])
-        turns.append(R)
-        places.append(p)
-    return Pose(Rotation(np.stack(turns)), np.stack(places))
+        grasps[i] = _pair(S, np.zeros((3, 3)) if level is None else level[i])
+    return Pose.stacked(grasps)
 
 
 def _never_together(data: TwistScatter, reference: int, i: int, names: tuple[str, ...]) -> str:
@@ -144,8 +140,8 @@ def _never_together(data: TwistScatter, reference: int, i: int, names: tuple[str
     return f"robots '{names[reference]}' and '{names[i]}' never measured twists at the same time; record them together."
 
 
-def _pair(S: Array, level: Array) -> tuple[Array, Array]:
-    """Return rotation (3, 3) and position (3,) of the second robot's grasp in the first's from their scatter."""
+def _pair(S: Array, level: Array) -> Pose:
+    """Return the second robot's grasp in the first's from their scatter."""
     w_w, v_v = S[:3, 6:9], S[3:6, 9:12]
     values, axes = np.linalg.eigh(S[:3, :3])
     candidates = [Rotation.aligning(w_w).matrix, Rotation.aligning(v_v).matrix]
@@ -166,7 +162,7 @@ def _pair(S: Array, level: Array) -> tuple[Array, Array]:
     found = [_position(S, R) for R in candidates]
     tilted = [2 * (1 - float((R * level).sum()) / told) if told else 0.0 for R in candidates]
     best = int(np.argmin([cost + tilt for (_, cost), tilt in zip(found, tilted, strict=True)]))
-    return candidates[best], found[best][0]
+    return Pose(Rotation(candidates[best]), found[best][0])
 
 
 def _turned(S: Array, R: Array) -> float:

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
@@ -100,18 +100,21 @@ class TwistTeam(MotionFit):
     @property
     def rough(self) -> bool:
         """Whether twists err by a good part of what they are."""
-        square = sum((part.twist**2 * part.seen[..., None]).sum((0, 1)) for part in self.parts)
-        rows = sum(int(part.seen.sum()) for part in self.parts)
-        size = np.sqrt(square.reshape(2, 3).sum(1) / (3 * rows))
-        return bool((self.fit.noise > LOUD * size).any())
+        square, rows = self._squares
+        return bool((self.fit.noise > LOUD * np.sqrt(square.sum(0) / (3 * rows.sum()))).any())
 
     @property
     def share(self) -> Array:
         """Noise (N, 2) as a share of each robot's twists (rms), turning and moving; all of what does not move."""
-        square = sum((part.twist**2 * part.seen[..., None]).sum(0).reshape(-1, 2, 3).sum(2) for part in self.parts)
-        rows = sum(part.seen.sum(0) for part in self.parts)
+        square, rows = self._squares
         size = np.sqrt(square / (3 * np.maximum(rows, 1))[:, None])
         return np.asarray(np.divide(self.fit.noise, size, out=np.ones_like(size), where=size > 0))
+
+    @cached_property
+    def _squares(self) -> tuple[Array, Integers]:
+        """Sums of the squares (N, 2) of each robot's twists, turning and moving, and of how many rows (N,)."""
+        seen = [(part.twist**2 * part.seen[..., None]).sum(0).reshape(-1, 2, 3).sum(2) for part in self.parts]
+        return np.sum(seen, axis=0), np.sum([part.seen.sum(0) for part in self.parts], axis=0)
 
     def down(self) -> Array | None:
         """Return the mean direction of gravity (3,) in R, None where nobody can tell it."""
