@@ -16,6 +16,7 @@ from steelyard.logs.clipping import NOISE_SHARE, clipped_rows, left_out, noise_s
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.repeated_rows import NOISY, columns_of, repeats, rising
 from steelyard.logs.runs import around, lasting, runs
+from steelyard.sanity.rows.stray_poses import without_strays
 from steelyard.spatial import cross_matrix
 
 # A channel is frozen when it holds still for this long although it never else does.
@@ -28,7 +29,7 @@ _MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 
 
 def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
-    """Return the recording without repeated, frozen and clipped rows and with rising clocks, and what was found."""
+    """Return the recording without repeated, stray, frozen and clipped rows, with rising clocks, and what was found."""
     tables = all(s.time is None for s in recording.streams)
     if tables:
         recording, findings = _repeated_in_tables(recording)
@@ -37,7 +38,7 @@ def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     streams: list[Stream] = []
     found: list[Finding] = []
     for stream in recording.streams:
-        for step in (_without_repeats, without_clipped, without_frozen):
+        for step in (_without_repeats, without_strays, without_clipped, without_frozen):
             stream, findings = step(stream)
             found.extend(findings)
         streams.append(rising(stream))
