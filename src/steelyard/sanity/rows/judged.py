@@ -89,7 +89,8 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     if stream.time is None or len(stream) < 4 * FROZEN_ROWS:
         return stream, ()
     frozen = np.zeros(len(stream), bool)
-    for name, rows in (("every channel", _hung_rows(stream)), ("the pose", _hung_poses(stream))):
+    every = "every channel" if set(stream.channels) <= set(NOISY) else "every noisy channel"
+    for name, rows in ((every, _hung_rows(stream)), ("the pose", _hung_poses(stream))):
         if rows.any() and not frozen.any():
             found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and jumps after"))
             frozen = rows
@@ -104,7 +105,9 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
             if dead[axis]:
                 found.append((name, "does not change at all while its neighbours do"))
             elif rows.any() and (same[rows[1:]][:, others].mean(0) < 0.5).any():
-                found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else"))
+                # One that only came to rest a little before the others, as behind a filter, is no case of its own.
+                if rows.sum() >= FROZEN_ROWS:
+                    found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else"))
                 frozen |= rows
     rest, then = left_out(stream, frozen)
     words = [(f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}", what) for name, what in found]
@@ -138,11 +141,13 @@ def _dead(values: Array) -> Mask:
 
 
 def _hung_rows(stream: Stream) -> Mask:
-    """Return rows (N,) in which a noisy stream repeats one row for long and then jumps, as a hung driver does."""
+    """Return rows (N,) in which what carries noise stands still for long and then jumps, as a hung driver does.
+
+    Poses, or a counter, may go on beside it.
+    """
     none = np.zeros(len(stream), bool)
-    if not set(NOISY) & set(stream.channels):
-        return none
-    return _any_of(_hung(columns_of(stream), stream), none)
+    noisy = {q: stream.channels[q] for q in NOISY if q in stream.channels}
+    return _any_of(_hung(columns_of(replace(stream, channels=noisy)), stream), none) if noisy else none
 
 
 def _hung_poses(stream: Stream) -> Mask:
