@@ -76,6 +76,20 @@ def test_a_hung_driver_is_named(recording: Recording) -> None:
     assert codes(with_wrench(recording, hung)) == ["channel-stuck"]
 
 
+@pytest.mark.parametrize("settling", [0, 3])
+def test_a_wrench_that_hangs_beside_poses_that_go_on_is_no_hand(settling: int) -> None:
+    """It was reported as contact. Behind a filter, one channel comes to rest before the others."""
+    stream = turning(1e-5, slice(0, 1))
+    force = np.cumsum(stream.channels["force"], axis=0)
+    force[300:420] = force[300]
+    force[300 - settling : 300, 0] = force[300, 0]
+    torque = 0.1 * np.roll(force, 1, axis=1)
+    seen, (finding,) = without_frozen(replace(stream, channels={**stream.channels, "force": force, "torque": torque}))
+    assert finding.code == "channel-stuck"
+    assert "Every noisy channel of 'a.csv' stands still in 120 of 1000 rows and jumps after" in finding.message
+    assert len(seen) == 880 - settling
+
+
 def turning(noise: float, held: slice) -> Stream:
     """Return noisy forces beside poses that turn slowly, stop for a second, and stand still in these rows."""
     rng = np.random.default_rng(4)

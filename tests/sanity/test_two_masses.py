@@ -101,7 +101,7 @@ def test_rows_at_rest_say_nothing() -> None:
 def test_about_one_axis_noise_of_the_motion_is_allowed_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """A lever passes for a mass there, and noise of either draws both (a sound sweep of one joint came out so)."""
     log = made("dyn_slow")
-    found = TwoMasses(1.92, np.array([0.0, 0, 0.1]), np.array([0.42, 0, 0, -0.1]), np.full(4, 0.026), 0.89, 0.146)
+    found = TwoMasses(1.92, np.array([0.0, 0, 0.1]), np.array([0.42, 0, 0, -0.1]), np.full(4, 0.026), 0.89, 9.0, 0.146)
     monkeypatch.setattr(load_motion, "two_masses", lambda log, bending=False: found)
     assert codes(log) == ["weight-compensated"]
     one_axis = replace(log, gravity=log.gravity * [0.001, 1, 1])

@@ -148,6 +148,6 @@ def _findings(estimate: Estimate) -> tuple[Finding, ...]:
     half_trace = float(np.trace(estimate.parameters.inertia_com)) / 2
     share = 50 * float(np.min(spread[4:][lost])) / max(half_trace, 1e-12)
     least = f"one standard deviation is at least {share:.0f} % of half its trace"
-    least = least if share < 1e3 else "no measured acceleration shows it"
+    least = least if share < 1e3 else "the rows that were fitted show next to nothing of it"
     text = f"The data do not fix the inertia entries {', '.join(ENTRIES[lost])}: {least}."
     return (Finding.of("inertia-not-identified", text),)

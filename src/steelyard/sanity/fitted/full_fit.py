@@ -19,6 +19,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
 from steelyard.logs.noise import mean_heard, robust_std
 from steelyard.logs.runs import picked
+from steelyard.sanity.lasting import clear, lasting
 from steelyard.spatial import cross_matrix
 
 _MOST_ROWS = 3000
@@ -154,13 +155,22 @@ class Rows:
 
         White noise hardly lasts that long. Rows of a table are taken one by one.
         """
-        miss = (self.values - self._with(extra) @ fit.solution) * np.sqrt(self.weights)
+        return lasting(self._missed(fit, extra), self._second)
+
+    def clear(self, plain: FullFit, fit: FullFit, extra: Array) -> float:
+        """Return how many times as much extra columns (N, 6, k) explain of what lasts as they leave (`lasting`)."""
+        return clear(self._missed(plain), self._missed(fit, extra), self._second)
+
+    def _missed(self, fit: FullFit, extra: Array | None = None) -> Array:
+        """Return the weighted residuals (N, 6)."""
+        return np.asarray((self.values - self._with(extra) @ fit.solution) * np.sqrt(self.weights))
+
+    @property
+    def _second(self) -> Integers:
+        """The second of the log (N,) that each row is in; rows of a table are one by one."""
         if self.log.time is None:
-            return float((miss**2).sum())
-        at = np.unique(np.floor(self.log.time / _MEAN_S), return_inverse=True)[1]
-        total = np.zeros((int(at.max()) + 1, 6))
-        np.add.at(total, at, miss)
-        return float((total**2 / np.bincount(at)[:, None]).sum())
+            return np.arange(len(self.values))
+        return np.asarray(np.unique(np.floor(self.log.time / _MEAN_S), return_inverse=True)[1])
 
     def tilting(self, phi: Array, rotation: Array, gravity: Array) -> Array:
         """Return the derivative (N, 6, 3) of the wrench by a small turn of gravity (3,) in W [rad]."""

@@ -26,8 +26,9 @@ from steelyard.sanity.readings.static_fit import clock_words, compensated
 from steelyard.spatial import cross_matrix
 
 # They differ where that is so many standard deviations, by leaving out stretches, beyond this share of the mass or this
-# distance [m], and leaves less of the squared residual.
-SURE, SHARE, APART, LEFT = 5.0, 0.1, 0.02, 0.99
+# distance [m], and explains so many times what it leaves (`Rows.clear`): a controller did 0.5 in a log with 2 Hz noise,
+# else 2.4 and more, one per cent of hysteresis 0.28 at most.
+SURE, SHARE, APART, CLEAR = 5.0, 0.1, 0.02, 0.4
 # A cable pulls back in the rhythm of a motion, as a mass that is not weighed would: a controller is blamed beyond so
 # many, and beyond this share, which a scale of lengths or clocks may make of accelerations.
 TAKEN, SCALED = 8.0, 0.02
@@ -57,6 +58,7 @@ class TwoMasses:
     mass, first_moment    [kg], (3,) [kg m] by acceleration
     less, less_std        (4,) [kg, kg m] how much less of them is weighed, with standard deviations
     left                  squared residual beside that with one mass
+    clear                 how many times as much both explain of what lasts as they leave, see `Rows.clear`
     noise                 share of noise in the squared acceleration of the rows
     """
 
@@ -65,6 +67,7 @@ class TwoMasses:
     less: Array
     less_std: Array
     left: float
+    clear: float
     noise: float
 
     @property
@@ -92,8 +95,8 @@ def two_masses(log: MotionLog, bending: bool = False) -> TwoMasses | None:
         made = replace(still, acceleration=log.acceleration).predicted(once.phi) - still.predicted(once.phi)
         extra = np.concatenate([extra, taken_away(log.time, made, BENDING)[pick, :, None]], 2)
     fit = rows.solve(extra, jackknife=True)
-    phi, left = fit.phi, fit.beside(once)
-    return TwoMasses(float(phi[0]), phi[1:4], fit.extra[:4], fit.extra_std[:4], left, noise_share(log))
+    phi, left, clear = fit.phi, fit.beside(once), rows.clear(once, fit, extra)
+    return TwoMasses(float(phi[0]), phi[1:4], fit.extra[:4], fit.extra_std[:4], left, clear, noise_share(log))
 
 
 def _weight(gravity: Array) -> Array:
@@ -109,7 +112,7 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
     if stands_aside("two masses", known):
         return ()
     found = two_masses(log)
-    if found is None or found.left > LEFT or min(found.mass, found.weighed) <= TOO_MUCH * abs(found.mass):
+    if found is None or found.clear < CLEAR or min(found.mass, found.weighed) <= TOO_MUCH * abs(found.mass):
         return ()
     short, spread = float(found.less[0]), float(found.less_std[0])
     both = (

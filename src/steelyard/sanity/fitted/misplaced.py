@@ -28,6 +28,9 @@ from steelyard.spatial import cross_matrix, lever_matrix
 APART, SURE, LEFT, FARTHEST = 0.01, 8.0, 0.95, 2.0
 # In slow motion noise hides what a point does: then what it leaves of means over a second tells. Sound logs keep 0.96.
 SLOWLY = 0.93
+# Beyond doubt it is where it explains so many times what it leaves (`Rows.clear`): errors of a sensor that come back
+# with the motion fall on any column.
+CLEAR = 0.5
 # From so many standard deviations on a point is held by the bars.
 MAYBE = 2.5
 # Forces k times too large look like a point at 1 - k times the centre of mass. So near, the unit is likelier.
@@ -47,6 +50,7 @@ class Misplaced:
     place, std  (3,) [m] from the origin of S, in S, with standard deviations by leaving out stretches of the log
     left        squared residual beside that with the origin of S
     slowly      the same, of means over a second
+    clear       how many times as much of these it explains as it leaves, see `Rows.clear`
     moved       (10,) what the parameters are less with it
     com         (3,) [m] centre of mass with it
     trace       [kg m^2] sum of the moments of inertia about it that a free fit has
@@ -60,6 +64,7 @@ class Misplaced:
     std: Array
     left: float
     slowly: float
+    clear: float
     moved: Array
     com: Array
     trace: float
@@ -77,7 +82,7 @@ class Misplaced:
         """Whether it is another point than the origin of S beyond doubt."""
         far = float(np.linalg.norm(self.place))
         least = APART + NOISE * self.noise * float(np.linalg.norm(self.com))
-        return self._stands_out(SURE) and least < far < FARTHEST
+        return self._stands_out(SURE) and self.clear > CLEAR and least < far < FARTHEST
 
     @property
     def maybe(self) -> bool:
@@ -185,10 +190,11 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
             break
     slow = rows.slowly(once)
     slowly = rows.slowly(fit, missed) / slow if slow else 1.0
+    clear = rows.clear(once, fit, missed)
     std, moved = np.sqrt(axes**2 @ fit.extra_std**2), once.phi - phi
     com = phi[1:4] / phi[0]
     trace = float(phi[4] + phi[7] + phi[9] - 2 * phi[0] * com @ com)
-    return Misplaced(place, std, fit.beside(once), slowly, moved, com, trace, noise_share(log), blind)
+    return Misplaced(place, std, fit.beside(once), slowly, clear, moved, com, trace, noise_share(log), blind)
 
 
 def examine_place(

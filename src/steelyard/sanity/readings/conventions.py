@@ -29,7 +29,7 @@ from steelyard.sanity.readings.rivals import (
     sign_of,
 )
 from steelyard.sanity.readings.silent import require_weight
-from steelyard.sanity.readings.static_fit import examine_both_masses, masses_at_a_glance
+from steelyard.sanity.readings.static_fit import apart_clearly, examine_both_masses, masses_at_a_glance
 from steelyard.sanity.readings.tilt import blind_axis, blind_tilt
 from steelyard.sanity.readings.torques import examine_swapped, examine_torques
 from steelyard.sanity.rows.still_rows import examine_leaps
@@ -182,4 +182,6 @@ def _moved_sign(view: Glance, reading: Reading) -> int:
         return 0
     masses, spread, _ = masses_at_a_glance(view, reading.gravity, reading.rotation)
     sure = abs(masses[0]) > 5 * spread[0] and 0.5 * abs(masses[1]) < abs(masses[0]) < 2 * abs(masses[1])
+    if sure and masses[0] * masses[1] < 0:
+        sure = apart_clearly(view, reading.gravity, reading.rotation)
     return int(np.sign(masses[0])) if sure else 0

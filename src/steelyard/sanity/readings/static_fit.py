@@ -15,7 +15,8 @@ import numpy as np
 from steelyard.check import Array, Integers
 from steelyard.findings import Finding, about
 from steelyard.identify.cost.left_out import block_scatter, jackknife, solutions
-from steelyard.sanity.readings.glance import Glance, Seen
+from steelyard.sanity.lasting import clear
+from steelyard.sanity.readings.glance import CUTOFF_HZ, Glance, Seen
 from steelyard.spatial import cross_matrix
 
 # A fit that leaves less than this share of the variance is as good as perfect: no rival can be better.
@@ -35,8 +36,9 @@ HEAVIEST = 100.0
 TOO_LARGE, CLOSELY = 2.0, 0.05
 # Nobody is wrong by a larger factor about a rate; masses that are this much unlike are worth a word about one.
 WRONG_RATE, CLOCK = 12.0, 1.2
-# Both masses together explain all but this share of the force variance.
-EXPLAINED = 0.5
+# Both masses together explain all but this share of the force variance, and of what one leaves of means over a second
+# so many times what they leave (`lasting`): a controller did 5 and more, hysteresis 0.6 at most.
+EXPLAINED, CLEAR = 0.5, 1.0
 TAKEN_AWAY = "the controller, or the sensor's driver, takes the weight of a payload away. The answer is what it leaves."
 
 
@@ -139,11 +141,34 @@ def masses_at_a_glance(view: Glance, gravity: Array, rotation: Array) -> tuple[A
 
     gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
     """
+    columns, force = _two_masses(view, gravity, rotation)
+    masses, spread, left = solve(columns, force, view.block)
+    return masses[:2], spread[:2], left
+
+
+def _two_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array]:
+    """Return what the force is linear in (N, 3, 2 or 5), a mass by acceleration and one by weight, and it (N, 3)."""
     seen = view.still.seen(gravity, rotation)
     slowed = view.seen(np.zeros(3), rotation).pull
     columns = beside(np.stack([-slowed, -seen.pull], 2), seen.lever)
-    masses, spread, left = solve(columns * seen.heard(1), seen.wrench[:, 3:], view.block)
-    return masses[:2], spread[:2], left
+    return columns * seen.heard(1), seen.wrench[:, 3:]
+
+
+def apart_clearly(view: Glance, gravity: Array, rotation: Array) -> bool:
+    """Tell whether two masses explain so much of what one leaves of the force that nothing else will have made it.
+
+    gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
+    """
+    two, force = _two_masses(view, gravity, rotation)
+    one = np.concatenate([two[:, :, :1] + two[:, :, 1:2], two[:, :, 2:]], 2)
+    left = []
+    for columns in (one, two):
+        _, solution, _ = leave_out(columns, force, view.block)
+        miss = force - columns @ solution
+        left.append(miss - miss.mean(0))
+    rate = 1.0 if view.rate is None else view.rate
+    free = 1.0 if view.rate is None else 2 * CUTOFF_HZ / rate
+    return clear(left[0], left[1], (np.arange(len(force)) / rate).astype(np.int64), free) > CLEAR
 
 
 def clock_words(moved: float, weighed: float) -> str:
@@ -185,6 +210,8 @@ def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) ->
     short = SHARE * abs(moved) - weighed
     sure = abs(moved) > SURE * spread[0] and short > SURE * float(np.hypot(SHARE * spread[0], spread[1]))
     if not sure or abs(moved) > HEAVIEST or left > EXPLAINED or weighed < -TOO_MUCH * abs(moved):
+        return ()
+    if not apart_clearly(view, gravity, rotation):
         return ()
     other = clock_words(abs(moved), weighed) if weighed > SURE * spread[1] and left < CLOSELY else ""
     return (compensated(both, other),)

@@ -16,6 +16,7 @@ from steelyard.logs.clipping import NOISE_SHARE, clipped_rows, left_out, noise_s
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.repeated_rows import NOISY, columns_of, repeats, rising
 from steelyard.logs.runs import around, lasting, runs
+from steelyard.sanity.rows.stray_poses import without_strays
 from steelyard.spatial import cross_matrix
 
 # A channel is frozen when it holds still for this long although it never else does.
@@ -28,7 +29,7 @@ _MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 
 
 def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
-    """Return the recording without repeated, frozen and clipped rows and with rising clocks, and what was found."""
+    """Return the recording without repeated, stray, frozen and clipped rows, with rising clocks, and what was found."""
     tables = all(s.time is None for s in recording.streams)
     if tables:
         recording, findings = _repeated_in_tables(recording)
@@ -37,7 +38,7 @@ def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     streams: list[Stream] = []
     found: list[Finding] = []
     for stream in recording.streams:
-        for step in (_without_repeats, without_clipped, without_frozen):
+        for step in (_without_repeats, without_strays, without_clipped, without_frozen):
             stream, findings = step(stream)
             found.extend(findings)
         streams.append(rising(stream))
@@ -88,7 +89,8 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     if stream.time is None or len(stream) < 4 * FROZEN_ROWS:
         return stream, ()
     frozen = np.zeros(len(stream), bool)
-    for name, rows in (("every channel", _hung_rows(stream)), ("the pose", _hung_poses(stream))):
+    every = "every channel" if set(stream.channels) <= set(NOISY) else "every noisy channel"
+    for name, rows in ((every, _hung_rows(stream)), ("the pose", _hung_poses(stream))):
         if rows.any() and not frozen.any():
             found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and jumps after"))
             frozen = rows
@@ -103,7 +105,9 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
             if dead[axis]:
                 found.append((name, "does not change at all while its neighbours do"))
             elif rows.any() and (same[rows[1:]][:, others].mean(0) < 0.5).any():
-                found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else"))
+                # One that only came to rest a little before the others, as behind a filter, is no case of its own.
+                if rows.sum() >= FROZEN_ROWS:
+                    found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else"))
                 frozen |= rows
     rest, then = left_out(stream, frozen)
     words = [(f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}", what) for name, what in found]
@@ -137,11 +141,13 @@ def _dead(values: Array) -> Mask:
 
 
 def _hung_rows(stream: Stream) -> Mask:
-    """Return rows (N,) in which a noisy stream repeats one row for long and then jumps, as a hung driver does."""
+    """Return rows (N,) in which what carries noise stands still for long and then jumps, as a hung driver does.
+
+    Poses, or a counter, may go on beside it.
+    """
     none = np.zeros(len(stream), bool)
-    if not set(NOISY) & set(stream.channels):
-        return none
-    return _any_of(_hung(columns_of(stream), stream), none)
+    noisy = {q: stream.channels[q] for q in NOISY if q in stream.channels}
+    return _any_of(_hung(columns_of(replace(stream, channels=noisy)), stream), none) if noisy else none
 
 
 def _hung_poses(stream: Stream) -> Mask:
