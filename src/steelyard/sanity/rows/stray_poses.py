@@ -11,8 +11,8 @@ from steelyard.sanity.rows.still_rows import TURN, WAY, angles
 
 # So many rows at most are away, by more than a leap (TURN, WAY) and so many times what lies between the rows beside.
 LONGEST, BACK = 4, 5.0
-# Poses of which more than this share are away are read wrongly, or tell no motion.
-MOST = 0.05
+# Where more than this share of the rows leap, poses are read wrongly, or were recorded one by one.
+MOST = 0.1
 
 
 def without_strays(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
@@ -20,7 +20,7 @@ def without_strays(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     if stream.time is None or "rotation" not in stream.channels:
         return stream, ()
     away = _away(stream)
-    if not away.any() or away.mean() > MOST:
+    if not away.any():
         return stream, ()
     count = int(away.sum())
     at = stream.time[away] - stream.time[0]
@@ -32,15 +32,17 @@ def without_strays(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
 
 
 def _away(stream: Stream) -> Mask:
-    """Return which rows (N,) have a pose that is away."""
-    rows, away = len(stream), np.zeros(len(stream), np.bool_)
+    """Return which rows (N,) have a pose that is away; none where poses leap often."""
+    row, away = np.arange(len(stream)), np.zeros(len(stream), np.bool_)
+    steps = _apart(stream, row[:-1], row[1:])
+    leaps = steps > 1
+    if leaps.sum() > MOST * len(steps):
+        return away
     for length in range(1, LONGEST + 1):
-        first = np.arange(1, rows - length)
-        if not len(first):
-            break
-        leaps = np.minimum(_apart(stream, first - 1, first), _apart(stream, first + length - 1, first + length))
-        found = first[(leaps > 1) & (leaps > BACK * _apart(stream, first - 1, first + length))]
-        away[(found[:, None] + np.arange(length)).ravel()] = True
+        before = np.flatnonzero(leaps[:-length] & leaps[length:])
+        smaller = np.minimum(steps[before], steps[before + length])
+        found = before[smaller > BACK * _apart(stream, before, before + length + 1)]
+        away[(found[:, None] + 1 + np.arange(length)).ravel()] = True
     return away
 
 
