@@ -7,9 +7,11 @@ import numpy as np
 from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
 from steelyard.logs.recording import Stream
-from steelyard.sanity.rows.still_rows import TURN, WAY, angles
+from steelyard.sanity.rows.still_rows import WAY, angles
 
-# So many rows at most are away, by more than a leap (TURN, WAY) and so many times what lies between the rows beside.
+# [rad] A leap, as is one by WAY. Angles that wrap and are read in the wrong unit leap by 2 pi degrees.
+TURN = float(np.radians(10))
+# So many rows at most are away, by more than a leap and so many times what lies between the rows beside.
 LONGEST, BACK = 4, 5.0
 # Where more than this share of the rows leap, poses are read wrongly, or were recorded one by one.
 MOST = 0.1
