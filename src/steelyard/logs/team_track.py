@@ -119,12 +119,12 @@ class Track:
     def rotation(self) -> Rotation:
         """Rotations R_HG (T,); identity in rows where `mask("rotation")` is False."""
         # They were judged when the track was made.
-        return Rotation._trusted(self.channels["rotation"])
+        return Rotation.trusted(self.channels["rotation"])
 
     @property
     def pose(self) -> Pose:
         """Poses X_HG (T,); identity in rows where `mask("rotation", "position")` is False."""
-        return Pose._trusted(self.rotation, self.channels["position"])
+        return Pose.trusted(self.rotation, self.channels["position"])
 
     def wrench(self) -> Array:
         """Return wrenches (T, 6) [N m, N], moment zero for a passive gimbal; zero where `mask("force")` is False."""

@@ -36,7 +36,7 @@ class Pose:
         object.__setattr__(self, "position", position)
 
     @classmethod
-    def _trusted(cls, rotation: Rotation, position: Array) -> Pose:
+    def trusted(cls, rotation: Rotation, position: Array) -> Pose:
         """Wrap what poses make of each other, finite and of one batch shape by construction."""
         pose = object.__new__(cls)
         position.flags.writeable = False
@@ -61,7 +61,7 @@ class Pose:
     @classmethod
     def stacked(cls, poses: Sequence[Pose]) -> Pose:
         """Return poses of one batch shape as one, along a new first axis."""
-        turns = Rotation._trusted(np.stack([pose.rotation.matrix for pose in poses]))
+        turns = Rotation.trusted(np.stack([pose.rotation.matrix for pose in poses]))
         return cls(turns, np.stack([pose.position for pose in poses]))
 
     def matrix(self) -> Array:
@@ -75,7 +75,7 @@ class Pose:
     def inverse(self) -> Pose:
         """Return X_BA."""
         back = self.rotation.inverse()
-        return Pose._trusted(back, -back._turned(self.position))
+        return Pose.trusted(back, -back.turned(self.position))
 
     def apply(self, point: ArrayLike) -> Array:
         """Return points (..., 3) given in B expressed in A [m]; the batch shapes broadcast."""
@@ -89,7 +89,7 @@ class Pose:
     def __matmul__(self, other: Twist) -> Twist: ...
     def __matmul__(self, other: Pose | Wrench | Twist) -> Pose | Wrench | Twist:
         if isinstance(other, Pose):
-            return Pose._trusted(self.rotation @ other.rotation, self.rotation._turned(other.position) + self.position)
+            return Pose.trusted(self.rotation @ other.rotation, self.rotation.turned(other.position) + self.position)
         if isinstance(other, Wrench):
             return self._move_wrench(other)
         if isinstance(other, Twist):
@@ -124,7 +124,7 @@ class Pose:
         rotation, position = self.rotation[index], self.position[index]
         if position.shape != (*rotation.batch, 3):
             raise BadValue(f"an index must choose among the batch {self.batch}; {index!r} cuts into the positions.")
-        return Pose._trusted(rotation, position)
+        return Pose.trusted(rotation, position)
 
     @property
     def batch(self) -> tuple[int, ...]:

@@ -32,7 +32,7 @@ class Rotation:
         object.__setattr__(self, "matrix", check.rotations("rotation matrix", self.matrix))
 
     @classmethod
-    def _trusted(cls, matrix: Array) -> Rotation:
+    def trusted(cls, matrix: Array) -> Rotation:
         """Wrap a matrix that is a rotation by construction.
 
         Products of accepted rotations are not judged anew: their errors add up, and an input just within the
@@ -47,7 +47,7 @@ class Rotation:
     @classmethod
     def identity(cls, *batch: int) -> Rotation:
         """Return the identity, repeated over the batch shape."""
-        return cls._trusted(np.broadcast_to(np.eye(3), (*batch, 3, 3)))
+        return cls.trusted(np.broadcast_to(np.eye(3), (*batch, 3, 3)))
 
     @classmethod
     def nearest(cls, matrix: ArrayLike) -> Rotation:
@@ -79,7 +79,7 @@ class Rotation:
     def _right_handed(cls, u: Array, vt: Array, sign: Array) -> Rotation:
         """Return u vt, its least singular direction turned where `sign`, the determinant, is -1."""
         u[..., :, 2] *= sign[..., None]
-        return cls._trusted(u @ vt)
+        return cls.trusted(u @ vt)
 
     @classmethod
     def from_quaternion_wxyz(cls, quaternion: ArrayLike) -> Rotation:
@@ -95,7 +95,7 @@ class Rotation:
             [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
-        return cls._trusted(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
+        return cls.trusted(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
 
     @classmethod
     def from_quaternion_xyzw(cls, quaternion: ArrayLike) -> Rotation:
@@ -125,7 +125,7 @@ class Rotation:
         v = check.vectors("rotation vector", vector)
         turns = np.linalg.norm(v, axis=-1)[..., None, None] / np.pi
         k = cross_matrix(v)
-        return cls._trusted(np.eye(3) + np.sinc(turns) * k + 0.5 * np.sinc(turns / 2) ** 2 * (k @ k))
+        return cls.trusted(np.eye(3) + np.sinc(turns) * k + 0.5 * np.sinc(turns / 2) ** 2 * (k @ k))
 
     def log(self) -> Array:
         """Return rotation vectors (..., 3) [rad], length at most pi."""
@@ -156,18 +156,18 @@ class Rotation:
     @classmethod
     def joined(cls, parts: Sequence[Rotation], axis: int = 0) -> Rotation:
         """Return rotations one after the other along an axis of the batch, `axis` counted from the front."""
-        return cls._trusted(np.concatenate([part.matrix for part in parts], axis=axis))
+        return cls.trusted(np.concatenate([part.matrix for part in parts], axis=axis))
 
     def inverse(self) -> Rotation:
         """Return R_BA."""
-        return Rotation._trusted(np.swapaxes(self.matrix, -1, -2))
+        return Rotation.trusted(np.swapaxes(self.matrix, -1, -2))
 
     def apply(self, vector: ArrayLike) -> Array:
         """Return vectors (..., 3) given in B expressed in A; the batch shapes broadcast."""
-        return self._turned(check.vectors("vector", vector))
+        return self.turned(check.vectors("vector", vector))
 
-    def _turned(self, vector: Array) -> Array:
-        """Return vectors (..., 3) that are known to be finite, expressed in A."""
+    def turned(self, vector: Array) -> Array:
+        """Return what `apply` does of vectors (..., 3) that are known to be finite: they are not judged anew."""
         return np.asarray(np.einsum("...ij,...j->...i", self.matrix, vector))
 
     def angle(self) -> Array:
@@ -177,13 +177,13 @@ class Rotation:
     def __matmul__(self, other: Rotation) -> Rotation:
         if not isinstance(other, Rotation):
             return NotImplemented
-        return Rotation._trusted(self.matrix @ other.matrix)
+        return Rotation.trusted(self.matrix @ other.matrix)
 
     def __getitem__(self, index: Any) -> Rotation:
         chosen = self.matrix[index]
         if chosen.shape[-2:] != (3, 3):
             raise BadValue(f"an index must choose among the batch {self.batch}; {index!r} cuts into the matrices.")
-        return Rotation._trusted(chosen)
+        return Rotation.trusted(chosen)
 
     @property
     def batch(self) -> tuple[int, ...]:

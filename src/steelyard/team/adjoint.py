@@ -64,14 +64,14 @@ def turns_between(first: Rotation, second: Rotation) -> Array:
 
 def turned_by(first: Rotation, turns: Array) -> Rotation:
     """Return the rotations (T, 1) that a single one comes to by rotation vectors (T, 3) [rad] in its own axes."""
-    return Rotation._trusted(_turned_by(first.matrix[None], turns)[:, None])
+    return Rotation.trusted(_turned_by(first.matrix[None], turns)[:, None])
 
 
 def moved(poses: Pose, steps: Array) -> Pose:
     """Return poses (N,) after small steps (N, 6) in their own axes: rotation vector [rad] and position [m]."""
     steps, turn = check.vectors("step", steps, 6), poses.rotation
-    turned = Rotation._trusted(_turned_by(turn.matrix, steps[:, :3]))
-    return Pose._trusted(turned, turn._turned(steps[:, 3:]) + poses.position)
+    turned = Rotation.trusted(_turned_by(turn.matrix, steps[:, :3]))
+    return Pose.trusted(turned, turn.turned(steps[:, 3:]) + poses.position)
 
 
 def twists_between(first: Pose, second: Pose) -> Array:
@@ -102,7 +102,7 @@ def turning_speed(track: Track, time: Array, over_s: float) -> Array:
     first, last = np.minimum(first, len(known) - 1), np.minimum(last, len(known) - 1)
     seconds = known[last] - known[first]
     if name == "rotation":
-        turns = turns_between(Rotation._trusted(values[first]), Rotation._trusted(values[last]))
+        turns = turns_between(Rotation.trusted(values[first]), Rotation.trusted(values[last]))
         speed = np.linalg.norm(turns, axis=1) / np.where(inside, seconds, 1.0)
     else:
         speed = np.linalg.norm(values[first], axis=1)

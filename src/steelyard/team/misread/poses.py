@@ -206,7 +206,7 @@ def _read(part: Stretch, i: int, reading: Reading[Pose]) -> Stretch | None:
         return None
     turns, places = part.poses.rotation.matrix.copy(), part.poses.position.copy()
     turns[seen, i], places[seen, i] = meant.rotation.matrix, meant.position
-    return replace(part, poses=Pose._trusted(Rotation._trusted(turns), places))
+    return replace(part, poses=Pose.trusted(Rotation.trusted(turns), places))
 
 
 @dataclass(frozen=True, eq=False)

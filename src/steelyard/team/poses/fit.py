@@ -73,7 +73,7 @@ class Rows:
             pattern, sweeps,
         )  # fmt: skip
         apart.flags.writeable = False
-        return cls(data, replace(team, motion=Pose._trusted(Rotation._trusted(turns), places)), apart)
+        return cls(data, replace(team, motion=Pose.trusted(Rotation.trusted(turns), places)), apart)
 
     @cached_property
     def residual(self) -> Array:
