@@ -107,13 +107,13 @@ def _jitters(off: Array) -> bool:
     return bool(means.std() * np.sqrt(_MEAN_OF) <= _WHITE * off.std())
 
 
-def _counts(time: Array) -> tuple[Integers, Integers]:
-    """Return two counts (N,) of samples: every row is the next one, or some were lost between them."""
+def _counts(time: Array) -> list[Integers]:
+    """Return counts (N,) of samples: every row is the next one and, where that differs, some were lost between them."""
     steps = np.diff(time) / median_step(time)
     gaps = np.where(steps > _GAP, np.round(steps), 1)
     lost = np.maximum(np.round(steps), 1)
     first, second = (np.concatenate([[0], np.cumsum(n)]).astype(np.int64) for n in (gaps, lost))
-    return first, second
+    return [first] if np.array_equal(first, second) else [first, second]
 
 
 def _even(time: Array, index: Integers) -> Array:
