@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from bent_rows import bent_row
+from steelyard.errors import NoMasses
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.masses.shape_error import MEASURED
@@ -94,3 +95,23 @@ def test_one_spread_is_that_of_the_shape_error() -> None:
     other = PartMasses(ROW, bias="none", shape_error=MEASURED.placed(*std)).identify(log)
     np.testing.assert_array_equal(one.parameters.vector, other.parameters.vector)
     np.testing.assert_array_equal(one.covariance, other.covariance)
+
+
+def aside(length_m: float, angle_deg: float) -> Parts:
+    """The row as it is said to lie, so far along y and turned about y."""
+    return ROW.in_frame(Pose(Rotation.exp(np.radians([0, angle_deg, 0])), np.array([0, length_m, 0])))
+
+
+@pytest.mark.parametrize("length_m", [0.025, 0.08])
+def test_a_place_far_beyond_what_a_grasp_allows_is_named_and_not_believed(length_m: float) -> None:
+    log = handling_log(TRUTH, "paper", noise="high", seed=1)
+    grasp = MEASURED.placed(2e-3, np.radians(1.0))
+    found = PartMasses(aside(length_m, 20), shape_error=grasp).identify(log)
+    assert "part-not-homogeneous" in found.codes()
+    assert off(found).max() < 3
+
+
+def test_parts_that_cannot_be_where_the_log_sees_them_are_refused_however_much_less_they_are_trusted() -> None:
+    log = handling_log(TRUTH, "paper", noise="high", seed=1)
+    with pytest.raises(NoMasses):
+        PartMasses(aside(0.3, 20)).identify(log)

@@ -255,3 +255,11 @@ def test_bad_recordings_say_what_is_missing():
 def test_delays_can_be_left_alone():
     aligned = align(recording(Swing(0, duration=6.0), imu_delay=0.013), AlignOptions(estimate_delays=False))
     assert set(aligned.delays_s.values()) == {0.0}
+
+
+def test_a_mount_is_found_where_turns_about_the_vertical_hardly_move_gravity() -> None:
+    mount = Rotation.exp([0.15, -0.16, 0.77])
+    aligned = align(recording(Swing(5, angle=0.3, axes=(0, 0, 1)), seed=0, imu_delay=0.005, mount=mount))
+    found = aligned.mounts["imu.csv"].rotation
+    assert np.degrees((found.inverse() @ mount).angle()) < 0.3
+    assert aligned.delays_s["imu.csv"] == pytest.approx(0.005, abs=5e-4)

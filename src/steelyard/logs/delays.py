@@ -96,32 +96,23 @@ def scan(question: Question) -> dict[str, float]:
     """
     delays = {**question.known, **dict.fromkeys(question.unknown, 0.0)}
     for name in sorted(question.unknown, key=lambda n: question.imu is None or n != question.imu.name):
-        delays[name] = _best_lag(question.thinned(_SCANNED), delays, name, by_wrench=True)
+        delays[name] = _best_lag(question.thinned(_SCANNED), delays, name)
     return {n: delays[n] for n in question.unknown}
 
 
-def scan_without_wrench(question: Question, delays: Mapping[str, float]) -> dict[str, float]:
-    """Return the delays with those of orientations and the like found against the accelerometer alone."""
-    out = dict(delays)
-    for name in question.unknown:
-        if question.imu is not None and name != question.imu.name:
-            out[name] = _best_lag(question.thinned(_SCANNED), out, name, by_wrench=False)
-    return out
-
-
-def _best_lag(question: Question, delays: Mapping[str, float], name: str, by_wrench: bool) -> float:
+def _best_lag(question: Question, delays: Mapping[str, float], name: str) -> float:
     grid = np.arange(-question.max_delay_s, question.max_delay_s + 1e-9, 0.004)
     grid = grid[np.argsort(np.abs(grid), kind="stable")]  # ties go to no delay
-    cost = [_scan_cost(question, {**delays, name: float(d)}, name, by_wrench) for d in grid]
+    cost = [_scan_cost(question, {**delays, name: float(d)}, name) for d in grid]
     return float(grid[int(np.argmin(cost))])
 
 
-def _scan_cost(question: Question, delays: Mapping[str, float], name: str, by_wrench: bool) -> float:
+def _scan_cost(question: Question, delays: Mapping[str, float], name: str) -> float:
     """Return the profile likelihood cost of free linear fits of the six channels."""
     motion, wrench, force = question.seen(delays)
     own = force is not None and question.imu is not None and name == question.imu.name
     chosen = [np.ones((len(force), 1)), force] if own and force is not None else features(motion, None)
-    cost = _log_share(wrench[:, ~np.array(question.felt.dead)], chosen) if by_wrench else 0.0
+    cost = _log_share(wrench[:, ~np.array(question.felt.dead)], chosen)
     if force is not None and not own and motion.gravity is not None:
         # The accelerometer feels gravity turn as well, and no hand on the object disturbs it.
         cost += _log_share(force, chosen)

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.autocorrelation import correlation_time
-from steelyard.logs.delays import Clocks, Question, features, free_residual, scan_without_wrench, turning
+from steelyard.logs.delays import Clocks, Question, features, free_residual, turning
 from steelyard.logs.imu import Imu, Mounting, first_mount
 from steelyard.logs.kinematics import Motion
 from steelyard.logs.log import MotionLog
@@ -29,9 +29,7 @@ _PRIOR: dict[str, float | list[float]] = {
 _STEP = 1e-4
 _LONGEST_STEP = 0.01  # [s] a delay may move at once
 _FINEST = 1e-4  # of a channel's spread: no residual is trusted below
-_SPOILED = 1.2  # times the accelerometer's residual with the mount that gravity tells
 _HELD = 1e-9
-_GRAVITY_CLOCK = 0.015  # [s] std of a delay told by comparing an accelerometer with orientations
 _LONGEST_MEMORY = 0.1  # of the rows: how far the correlation of residuals is followed
 
 
@@ -59,19 +57,10 @@ class _Layout:
         width = np.concatenate([np.broadcast_to(_PRIOR[name], len(block)) for name, block in blocks.items()])
         return cls(question, slices, np.concatenate(list(blocks.values())), width, mount)
 
-    def held(self, *names: str) -> _Layout:
-        """Return the layout with these blocks held where they start."""
+    def held(self, name: str) -> _Layout:
+        """Return the layout with a block held where it starts."""
         width = self.width.copy()
-        for name in names:
-            width[self.slices[name]] = _HELD
-        return replace(self, width=width)
-
-    def held_clocks(self) -> _Layout:
-        """Return the layout with every delay but the accelerometer's held where it starts."""
-        width, imu = self.width.copy(), self.question.imu
-        for i, name in enumerate(self.question.unknown):
-            if imu is None or name != imu.name:
-                width[self.slices["delay"].start + i] = _HELD
+        width[self.slices[name]] = _HELD
         return replace(self, width=width)
 
     def get(self, theta: Array, name: str, default: Array) -> Array:
@@ -112,21 +101,13 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
     if question.imu is not None and force is not None:
         mount = question.imu.rotation or first_mount(force, motion.gravity, wrench[:, 3:])
     free_centre = motion.gravity is not None and not motion.measured
-    layout = _Layout.of(question, delays, mount, centre=free_centre)
-    layout = _mount_by_gravity(layout)
+    layout = _mount_by_gravity(_Layout.of(question, delays, mount, centre=free_centre))
     theta, weights = _rounds(layout)
-    if _mount_spoiled(layout, theta):
-        # A hand on the object: what accelerometer and gravity tell alone is kept out of the wrench's reach.
-        calm = scan_without_wrench(question, layout.delays(theta))
-        layout = _Layout.of(question, calm, mount, centre=free_centre)
-        layout = _mount_by_gravity(layout).held("rotation", "bias").held_clocks()
-        theta, weights = _rounds(layout)
     std = _block_std(layout, theta, weights)
     residual = _residual(layout, theta)[:, :6]
     found = layout.delays(theta)
     spread = dict.fromkeys(found, 0.0)
-    loose = np.where(layout.width[layout.slices["delay"]] < _HELD * 2, _GRAVITY_CLOCK, std[layout.slices["delay"]])
-    spread.update(zip(question.unknown, (float(v) for v in loose), strict=True))
+    spread.update(zip(question.unknown, (float(v) for v in std[layout.slices["delay"]]), strict=True))
     mounting = None
     if question.imu is not None:
         mounting = replace(
@@ -183,17 +164,6 @@ def _rounds(layout: _Layout) -> tuple[Array, Array]:
     for k in range(_ROUNDS):
         theta, weights, sigma = _descend(layout, theta, sigma, power=1 if k < _ROUNDS // 2 else 2)
     return theta, weights
-
-
-def _mount_spoiled(layout: _Layout, theta: Array) -> bool:
-    """Say whether the wrench has turned the mount away from what gravity shows (a hand on the object does)."""
-    if "rotation" not in layout.slices:
-        return False
-    mounted = theta.copy()
-    for name in ("rotation", "bias"):
-        mounted[layout.slices[name]] = layout.start[layout.slices[name]]
-    sizes = [np.median(np.abs(_residual(layout, t)[:, 6:]).sum(1)) for t in (mounted, theta)]
-    return bool(sizes[1] > _SPOILED * sizes[0])
 
 
 def _mount_by_gravity(layout: _Layout) -> _Layout:
