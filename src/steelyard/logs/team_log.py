@@ -25,6 +25,7 @@ Kind = Literal["grasp", "still", "motion"]
 Base = Literal["still", "moving"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _TURNING = ("rotation", "angular_velocity")
+_WRENCH = ("force", "torque")
 T = TypeVar("T")
 
 __all__ = ["KINDS", "Base", "Kind", "Mask", "TeamLog", "TeamRecording", "TeamRobot", "Track"]
@@ -97,6 +98,11 @@ class TeamRecording:
             return np.full(len(time), name not in self.away)
         half = 0.5 * median_step(track.time) if len(track) > 1 else 0.5
         return track.carrying[np.clip(np.searchsorted(track.time, time - half), 0, len(track) - 1)]
+
+    def while_holding(self) -> TeamRecording:
+        """Return the recording without the motion of robots while they are known to hold nothing: it is their own."""
+        held = {name: self.carries(name, track.time) for name, track in self.tracks.items()}
+        return self.changed(_moving_only, {name: rows for name, rows in held.items() if not rows.all()})
 
     def changed(self, change: Callable[[Track, T], Track], by: Mapping[str, T]) -> TeamRecording:
         """Return the recording with the tracks of the robots in `by` as `change` makes them of what stands there."""
@@ -234,6 +240,10 @@ class TeamLog:
         robots = tuple(replace(robot, gravity=None) if robot.name == name else robot for robot in self.robots)
         return replace(self, robots=robots)
 
+    def while_holding(self) -> TeamLog:
+        """Return the same log without the motion of robots while they are known to hold nothing."""
+        return self.with_recordings(*(recording.while_holding() for recording in self.recordings))
+
     def with_recordings(self, *recordings: TeamRecording) -> TeamLog:
         """Return the same team with other recordings."""
         return replace(self, recordings=recordings)
@@ -258,6 +268,11 @@ class TeamLog:
         """Return the log as recorded with other home frames: X_AH of each new home A; others keep theirs."""
         robots = tuple(_rehomed(robot, homes.get(robot.name)) for robot in self.robots)
         return replace(self, robots=robots, recordings=tuple(r.changed(Track.moved, homes) for r in self.recordings))
+
+
+def _moving_only(track: Track, rows: Mask) -> Track:
+    """Return the track with what it says of motion in these rows (T,) alone."""
+    return replace(track, valid={q: mask if q in _WRENCH else mask & rows for q, mask in track.valid.items()})
 
 
 def _rehomed(robot: TeamRobot, home: Pose | None) -> TeamRobot:

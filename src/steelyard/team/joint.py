@@ -68,6 +68,7 @@ class JointTeam:
         """Return the team's answer in the reference grasp. Raises CannotAnswer where the data leave it open."""
         require_wrenches(log)
         self._require_wrists(log)
+        log = log.while_holding()
         if self.slipped is None:
             log, jumped = cut_at_jumps(log, drifts=True) if self.clocks else (log, NOTHING)
             return whose_slip(log, lambda slipped: replace(self, slipped=slipped, jumped=jumped).identify(log))
