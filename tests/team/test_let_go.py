@@ -11,7 +11,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import GRAVITY, Presence, Slip, TeamNoise, TeamScene
-from steelyard.team.changes.presence import strayers
+from steelyard.team.changes.presence import EDGE_S, let_go, strayers
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.stacked import stretches
@@ -67,6 +67,34 @@ def test_of_two_robots_the_one_that_stays_bears_more_and_has_not_let_go_before(k
     assert [finding.code for finding in found.findings] == ["robot-left"]
     error = np.append(found.mass, found.com) - np.append(body.mass, body.com)
     assert np.abs(error / found.std[:4]).max() < 4
+
+
+def test_a_light_gripper_lets_go_once() -> None:
+    """0.4 kg are now less than a tenth of what the robot bore, now more."""
+    every = frozenset({0, 1, 2, 3})
+    scene = TeamScene(
+        NOISE, 4, sensing="poses", six_axis=every, motion_samples=2000, presence=(Presence(WHO, leaves=LEAVES),)
+    )
+    found = JointTeam().identify(with_gripper(simulate_team(scene, 2), 0.4)[0])
+    assert [finding.code for finding in found.findings] == ["robot-left"]
+
+
+def test_around_a_change_nobodys_wrench_is_used_nor_the_poses_of_the_one_who_changes() -> None:
+    (part,) = stretches(
+        simulate_team(TeamScene(NOISE, sensing="poses", kinds=("motion",), motion_samples=1500), 0).log, {}
+    )
+    bare, nobody = np.zeros(part.seen.shape, np.bool_), np.zeros(3, np.bool_)
+    bare[600:1000, 1] = True
+    edge = int(np.ceil(EDGE_S * part.rate))
+    out = let_go(part, bare, bare, np.where(bare, 50.0, 1.0), nobody)
+    near = np.zeros(len(part), np.bool_)
+    near[600 - edge : 600 + edge] = near[1000 - edge : 1000 + edge] = True
+    assert (out.felt == part.felt & ~near[:, None]).all()
+    assert (out.carries[:, 1] == ~bare[:, 1]).all()
+    away = np.zeros(len(part), np.bool_)
+    away[600 - edge : 1000 + edge] = True
+    assert (out.seen[:, 1] == part.seen[:, 1] & ~away).all()
+    assert (out.seen[:, [0, 2]] == part.seen[:, [0, 2]]).all()
 
 
 def test_a_robot_that_bears_little_has_not_let_go_where_its_grasp_slipped() -> None:
