@@ -143,8 +143,6 @@ class JointTeam:
         Numbers that degenerate on the way count as too little. Of the rigid fit's findings (`standing`), only who let
         go or took hold is said again: that shows in the wrenches. The hinge itself may pass for a slip.
         """
-        if split.hinge is None:
-            return None
         try:
             team, payload = identify_two_bodies(log, split, self.clocks, self.gains, self.wrists, self.highest_hz)
         except check.FAILURES:
