@@ -99,11 +99,6 @@ class TeamRecording:
         half = 0.5 * median_step(track.time) if len(track) > 1 else 0.5
         return track.carrying[np.clip(np.searchsorted(track.time, time - half), 0, len(track) - 1)]
 
-    def while_holding(self) -> TeamRecording:
-        """Return the recording without the motion of robots while they are known to hold nothing: it is their own."""
-        held = {name: self.carries(name, track.time) for name, track in self.tracks.items()}
-        return self.changed(_moving_only, {name: rows for name, rows in held.items() if not rows.all()})
-
     def changed(self, change: Callable[[Track, T], Track], by: Mapping[str, T]) -> TeamRecording:
         """Return the recording with the tracks of the robots in `by` as `change` makes them of what stands there."""
         if not self.tracks.keys() & by.keys():
@@ -241,8 +236,16 @@ class TeamLog:
         return replace(self, robots=robots)
 
     def while_holding(self) -> TeamLog:
-        """Return the same log without the motion of robots while they are known to hold nothing."""
-        return self.with_recordings(*(recording.while_holding() for recording in self.recordings))
+        """Return the same log without the motion of robots while they are known to hold nothing: it is their own.
+
+        Of one who never holds anything it is all that there is, and stays.
+        """
+        held = [{n: r.carries(n, t.time) for n, t in r.tracks.items()} for r in self.recordings]
+        holders = {n for rows in held for n, mask in rows.items() if mask.any()}
+        return self.with_recordings(*(
+            r.changed(_moving_only, {n: mask for n, mask in rows.items() if n in holders and not mask.all()})
+            for r, rows in zip(self.recordings, held, strict=True)
+        ))  # fmt: skip
 
     def with_recordings(self, *recordings: TeamRecording) -> TeamLog:
         """Return the same team with other recordings."""

@@ -138,7 +138,8 @@ class PublishedTeam:
 
 def _conditioned(log: TeamLog, recordings: Sequence[TeamRecording], cutoff_hz: float | None) -> tuple[TeamRows, ...]:
     """Return the rows of recordings, filtered; who holds nothing says nothing of the payload's motion."""
-    return all_conditioned(log, tuple(recording.while_holding() for recording in recordings), cutoff_hz)
+    held = dict(zip(log.recordings, log.while_holding().recordings, strict=True))
+    return all_conditioned(log, tuple(held[recording] for recording in recordings), cutoff_hz)
 
 
 def require_wrenches(log: TeamLog) -> None:
