@@ -11,7 +11,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import GRAVITY, Presence, Slip, TeamNoise, TeamScene
-from steelyard.team.changes.presence import strayers
+from steelyard.team.changes.presence import EDGE_S, let_go, strayers
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.stacked import stretches
@@ -20,9 +20,9 @@ NOISE = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.3, torque_white_Nm
 GRIPPER, LEAVES, WHO = 0.8, 8.0, 2
 
 
-def with_gripper(trial: TeamTrial, kg: float) -> tuple[TeamLog, InertialParameters]:
+def with_gripper(trial: TeamTrial, kg: float, who: int = WHO) -> tuple[TeamLog, InertialParameters]:
     """The log with a point mass at one grasp, beyond its sensor, and all that is held before it lets go."""
-    name, recordings = f"robot{WHO}", []
+    name, recordings = f"robot{who}", []
     for recording in trial.log.recordings:
         track = recording.tracks[name]
         # Noise of positions is far below what the gripper weighs, once it is smoothed.
@@ -34,7 +34,7 @@ def with_gripper(trial: TeamTrial, kg: float) -> tuple[TeamLog, InertialParamete
         pull = kg * np.einsum("tji,tj->ti", track.channels["rotation"], rise + np.array([0.0, 0.0, GRAVITY]))
         held = replace(track, channels={**track.channels, "force": track.channels["force"] + pull})
         recordings.append(replace(recording, tracks={**recording.tracks, name: held}))
-    point = InertialParameters.from_point_masses(np.array([kg]), trial.truth.grasps.position[WHO][None])
+    point = InertialParameters.from_point_masses(np.array([kg]), trial.truth.grasps.position[who][None])
     return trial.log.with_recordings(*recordings), trial.truth.body + point
 
 
@@ -55,6 +55,46 @@ def test_it_is_told_by_its_way_and_no_wrench_is_used_from_then_on(six_axis: froz
     assert not told(found, "grasp-slipped")
     error = np.append(found.mass, found.com) - np.append(body.mass, body.com)
     assert np.abs(error / found.std[:4]).max() < 4
+
+
+@pytest.mark.parametrize("kg", [0.0, GRIPPER])
+def test_of_two_robots_the_one_that_stays_bears_more_and_has_not_let_go_before(kg: float) -> None:
+    """Without the rows in which either pushes with less than usual the two have none in common."""
+    two = TeamScene(NOISE, 2, sensing="poses", six_axis=frozenset({0, 1}), kinds=("motion",), motion_samples=1500)
+    trial = simulate_team(replace(two, presence=(Presence(1, leaves=6.0),)), 0)
+    log, body = with_gripper(trial, kg, 1)
+    found = JointTeam().identify(log)
+    assert [finding.code for finding in found.findings] == ["robot-left"]
+    error = np.append(found.mass, found.com) - np.append(body.mass, body.com)
+    assert np.abs(error / found.std[:4]).max() < 4
+
+
+def test_a_light_gripper_lets_go_once() -> None:
+    """0.4 kg are now less than a tenth of what the robot bore, now more."""
+    every = frozenset({0, 1, 2, 3})
+    scene = TeamScene(
+        NOISE, 4, sensing="poses", six_axis=every, motion_samples=2000, presence=(Presence(WHO, leaves=LEAVES),)
+    )
+    found = JointTeam().identify(with_gripper(simulate_team(scene, 2), 0.4)[0])
+    assert [finding.code for finding in found.findings] == ["robot-left"]
+
+
+def test_around_a_change_nobodys_wrench_is_used_nor_the_poses_of_the_one_who_changes() -> None:
+    (part,) = stretches(
+        simulate_team(TeamScene(NOISE, sensing="poses", kinds=("motion",), motion_samples=1500), 0).log, {}
+    )
+    bare, nobody = np.zeros(part.seen.shape, np.bool_), np.zeros(3, np.bool_)
+    bare[600:1000, 1] = True
+    edge = int(np.ceil(EDGE_S * part.rate))
+    out = let_go(part, bare, bare, np.where(bare, 50.0, 1.0), nobody)
+    near = np.zeros(len(part), np.bool_)
+    near[600 - edge : 600 + edge] = near[1000 - edge : 1000 + edge] = True
+    assert (out.felt == part.felt & ~near[:, None]).all()
+    assert (out.carries[:, 1] == ~bare[:, 1]).all()
+    away = np.zeros(len(part), np.bool_)
+    away[600 - edge : 1000 + edge] = True
+    assert (out.seen[:, 1] == part.seen[:, 1] & ~away).all()
+    assert (out.seen[:, [0, 2]] == part.seen[:, [0, 2]]).all()
 
 
 def test_a_robot_that_bears_little_has_not_let_go_where_its_grasp_slipped() -> None:

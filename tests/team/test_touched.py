@@ -59,6 +59,14 @@ def test_a_recording_that_a_hand_moves_throughout_is_not_weighed() -> None:
     assert worst(found, trial) < 4
 
 
+def test_what_is_usual_is_told_by_other_recordings_where_a_hand_pushes_most_of_one() -> None:
+    trial = simulate_team(replace(case("C"), motion_samples=3000), 3)
+    starts = tuple(np.arange(0.2, 18.0, 1.2))
+    found = JointTeam().identify(pushed(trial, len(trial.log.recordings) - 1, starts, 1.8, 1.5 * PUSH))
+    assert found.codes() == {"contact"}
+    assert worst(found, trial) < 4
+
+
 def test_what_is_needed_of_one_recording_is_not_left_out() -> None:
     trial = simulate_team(TeamScene(CASES["C"], kinds=("still", "motion"), motion_samples=1500), 5)
     starts = tuple(np.arange(0.2, 14.5, 1.2))

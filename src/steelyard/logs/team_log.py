@@ -25,6 +25,7 @@ Kind = Literal["grasp", "still", "motion"]
 Base = Literal["still", "moving"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _TURNING = ("rotation", "angular_velocity")
+_WRENCH = ("force", "torque")
 T = TypeVar("T")
 
 __all__ = ["KINDS", "Base", "Kind", "Mask", "TeamLog", "TeamRecording", "TeamRobot", "Track"]
@@ -234,6 +235,18 @@ class TeamLog:
         robots = tuple(replace(robot, gravity=None) if robot.name == name else robot for robot in self.robots)
         return replace(self, robots=robots)
 
+    def while_holding(self) -> TeamLog:
+        """Return the same log without the motion of robots while they are known to hold nothing: it is their own.
+
+        Of one who never holds anything it is all that there is, and stays.
+        """
+        held = [{n: r.carries(n, t.time) for n, t in r.tracks.items()} for r in self.recordings]
+        holders = {n for rows in held for n, mask in rows.items() if mask.any()}
+        return self.with_recordings(*(
+            r.changed(_moving_only, {n: mask for n, mask in rows.items() if n in holders and not mask.all()})
+            for r, rows in zip(self.recordings, held, strict=True)
+        ))  # fmt: skip
+
     def with_recordings(self, *recordings: TeamRecording) -> TeamLog:
         """Return the same team with other recordings."""
         return replace(self, recordings=recordings)
@@ -258,6 +271,11 @@ class TeamLog:
         """Return the log as recorded with other home frames: X_AH of each new home A; others keep theirs."""
         robots = tuple(_rehomed(robot, homes.get(robot.name)) for robot in self.robots)
         return replace(self, robots=robots, recordings=tuple(r.changed(Track.moved, homes) for r in self.recordings))
+
+
+def _moving_only(track: Track, rows: Mask) -> Track:
+    """Return the track with what it says of motion in these rows (T,) alone."""
+    return replace(track, valid={q: mask if q in _WRENCH else mask & rows for q, mask in track.valid.items()})
 
 
 def _rehomed(robot: TeamRobot, home: Pose | None) -> TeamRobot:

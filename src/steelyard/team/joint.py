@@ -68,6 +68,7 @@ class JointTeam:
         """Return the team's answer in the reference grasp. Raises CannotAnswer where the data leave it open."""
         require_wrenches(log)
         self._require_wrists(log)
+        log = log.while_holding()
         if self.slipped is None:
             log, jumped = cut_at_jumps(log, drifts=True) if self.clocks else (log, NOTHING)
             return whose_slip(log, lambda slipped: replace(self, slipped=slipped, jumped=jumped).identify(log))
@@ -142,8 +143,6 @@ class JointTeam:
         Numbers that degenerate on the way count as too little. Of the rigid fit's findings (`standing`), only who let
         go or took hold is said again: that shows in the wrenches. The hinge itself may pass for a slip.
         """
-        if split.hinge is None:
-            return None
         try:
             team, payload = identify_two_bodies(log, split, self.clocks, self.gains, self.wrists, self.highest_hz)
         except check.FAILURES:

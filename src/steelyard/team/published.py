@@ -20,7 +20,7 @@ from steelyard.inertia.people import parameter_jacobian
 from steelyard.logs.clock import median_step
 from steelyard.logs.stillness import MOVING, TURNING
 from steelyard.logs.team_conditioning import all_conditioned
-from steelyard.logs.team_log import TeamLog
+from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import TeamRows
 from steelyard.spatial import Pose
 from steelyard.team import grasp_kinematics
@@ -70,7 +70,7 @@ class PublishedTeam:
 
     def grasps(self, log: TeamLog) -> tuple[Pose, dict[str, Pair]]:
         """Return the grasps in the reference grasp, and the star of pairs that they started from (eq. 1-8)."""
-        moving = all_conditioned(log, log.of_kind("grasp"), self.cutoff_hz)
+        moving = _conditioned(log, log.of_kind("grasp"), self.cutoff_hz)
         if not moving:
             raise CannotAnswer("grasps need a recording in motion, of kind grasp or motion; there is none.")
         twists = np.concatenate([rows.twist for rows in moving], axis=1)
@@ -91,7 +91,7 @@ class PublishedTeam:
             )
         still = tuple(r for r in log.recordings if r.kind == "still")
         # Still rows are averaged, which no filter improves on: near its ends it would weigh single samples heavily.
-        resting = all_conditioned(log, still or log.of_kind("motion"), None if still else self.cutoff_hz)
+        resting = _conditioned(log, still or log.of_kind("motion"), None if still else self.cutoff_hz)
         level = [_level(log, rows) for rows in resting]
         chosen = [
             _at_rest(rows, bool(still)) & rows.complete_wrench() & rows.has_gravity[teller]
@@ -115,7 +115,7 @@ class PublishedTeam:
         """
         omega, alpha, moment = [], [], []
         alike = 1.0
-        for rows in all_conditioned(log, log.of_kind("motion"), self.cutoff_hz):
+        for rows in _conditioned(log, log.of_kind("motion"), self.cutoff_hz):
             if self.trim_s:
                 rows = rows.trimmed(self.trim_s)
             hub = rows.index(log.reference)
@@ -134,6 +134,12 @@ class PublishedTeam:
         if self.cutoff_hz is None or len(rows.time) < 2:
             return 1.0
         return max(1.0, 1 / (2 * self.cutoff_hz * median_step(rows.time)))
+
+
+def _conditioned(log: TeamLog, recordings: Sequence[TeamRecording], cutoff_hz: float | None) -> tuple[TeamRows, ...]:
+    """Return the rows of recordings, filtered; who holds nothing says nothing of the payload's motion."""
+    held = dict(zip(log.recordings, log.while_holding().recordings, strict=True))
+    return all_conditioned(log, tuple(held[recording] for recording in recordings), cutoff_hz)
 
 
 def require_wrenches(log: TeamLog) -> None:

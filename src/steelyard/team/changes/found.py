@@ -10,6 +10,7 @@ slip.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -47,7 +48,7 @@ def without_changes(
     bare, light = idle(raw, SHARE), idle(raw, LIGHT)
     given = None if any(rows.any() for rows in bare) else fitted(_unchanged)
     # One who goes ways of its own makes a rough fit; else who pushes with little merely does.
-    asked = None if given is not None and not given.rough else _asked(bare, light, fitted)
+    asked = None if given is not None and not given.rough else _asked(light, fitted)
     if asked is None:
         given = fitted(_unchanged) if given is None else given
         return _without_slips(log, clocks, given, fitted, _unchanged, other)
@@ -64,7 +65,7 @@ def without_changes(
     return replace(team, findings=(*found, *team.findings))
 
 
-def _asked(bare: Sequence[Mask], light: Sequence[Mask], fitted: Callable[[Edit], F]) -> tuple[Sequence[Mask], F] | None:
+def _asked(light: Sequence[Mask], fitted: Callable[[Edit], F]) -> tuple[Sequence[Mask], F] | None:
     """Return rows (T, N) in which robots that push with little may have let go, and the fit without those poses.
 
     All robots' rows; where too little is left without them, those of the robot without whom the others agree best, as
@@ -72,12 +73,8 @@ def _asked(bare: Sequence[Mask], light: Sequence[Mask], fitted: Callable[[Edit],
     """
     if not any(rows.any() for rows in light):
         return None
-    nobody_bare = not any(rows.any() for rows in bare)
-    try:
+    with suppress(*FAILURES):
         return light, fitted(partial(_unseen, rows=light))
-    except FAILURES:
-        if not nobody_bare:
-            return bare, fitted(partial(_unseen, rows=bare))
     best: tuple[Sequence[Mask], F] | None = None
     for robot in np.flatnonzero(np.any([rows.any(0) for rows in light], axis=0)):
         own = [rows & (np.arange(rows.shape[1]) == robot) for rows in light]
