@@ -56,7 +56,7 @@ def with_one_load(
             continue
         parts = []
         for later in (False, True):
-            kept = body.without([_gone(body, run, step.at, later) for run in body.runs], highest_hz)
+            kept = body.without([_gone(run, step.at, later) for run in body.runs], highest_hz)
             tried = [*rows[:k], (kept, left), *rows[k + 1 :]]
             try:
                 again = fitted(tried)
@@ -137,7 +137,7 @@ def _steps(pushed: Array, always: Array, steps: Array) -> tuple[Array, Array, Ar
     return whole - np.einsum("bs,bs->b", sizes, after[2]), H, sizes, whole
 
 
-def _gone(body: BodyRows, run: Run, at: float, later: bool) -> Mask:
+def _gone(run: Run, at: float, later: bool) -> Mask:
     """Return the rows (T,) of a run that are left out where the part after the step is kept, or that before it."""
     time = (run.rows.start + np.arange(len(run.motion))) / run.rate
     return np.asarray(time < at + MARGIN_S if later else time > at - MARGIN_S)
