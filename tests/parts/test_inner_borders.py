@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,14 @@ def test_a_ball_cut_at_any_height_has_parts_of_the_right_volume(height: float, n
     np.testing.assert_allclose(shares(found, cloud.labels), true / true.sum(), rtol=0.04)
     far = np.linalg.norm(found.parts.centroid - np.outer(found.parts.centroid @ normal, normal), axis=1)
     assert far.max() < 6e-4
+
+
+def test_corners_at_cuts_are_as_unsure_as_corners_of_another_part() -> None:
+    """Cutting draws the border where a flat one would be: it must not make the bars of the parts smaller."""
+    cloud = ball([0.0], NORMALS[0])
+    found = segment(cloud, enclose(cloud), parts=2)
+    assert found.inner > 0
+    assert found.border_share > 1.5 * replace(found, inner=0).border_share
 
 
 def test_cells_from_cap_to_cap_are_cut_at_both_borders() -> None:

@@ -8,7 +8,8 @@ from steelyard.shape.points.noisy_points import settled
 from steelyard.shape.solid import Solid
 from steelyard.shape.volume import enclose
 from steelyard.workshop.sampling import spread_evenly
-from steelyard.workshop.sheets import sheets
+from steelyard.workshop.sheets import sheet_of, sheets
+from steelyard.workshop.solids import block
 
 RADIUS = 0.04
 BALL_M3 = 4 / 3 * np.pi * RADIUS**3
@@ -111,3 +112,23 @@ def test_normals_whose_signs_are_by_chance_are_found_anew(wrong: float) -> None:
     solid = enclose(Cloud(xyz, normals=out * sign[:, None]))
     assert solid.mesh.volume == pytest.approx(BALL_M3, rel=0.02)
     assert codes(solid) == {"normals-flipped"}
+
+
+def noisy_channel(points: int, noise: float, seed: int) -> tuple[Solid, float]:
+    """Return the solid of a square channel with walls of 2 mm, and its true volume."""
+    body = block((0, 100), (0, 15), (0, 15)) - block((-1, 101), (2, 13), (2, 16))
+    made = sheet_of("channel", body, np.random.default_rng(seed), points)
+    moved = made.cloud.xyz + noise * np.random.default_rng(seed).standard_normal((points, 3))
+    return enclose(Cloud(moved)), made.volume
+
+
+def test_points_as_given_stay_away_where_their_solid_is_in_more_doubt() -> None:
+    """Neither is clear: as given, they fill a part of the channel."""
+    solid, true = noisy_channel(8000, 6e-4, 0)
+    assert solid.mesh.volume == pytest.approx(true, rel=0.1)
+    assert "cloud-noisy" in codes(solid)
+
+
+def test_doubt_about_settled_points_and_about_those_given_is_said_once() -> None:
+    solid, _ = noisy_channel(1500, 1e-3, 1)
+    assert [finding.code for finding in solid.findings] == ["cloud-noisy", "thin-thickened"]

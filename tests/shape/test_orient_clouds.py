@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.orient import oriented
+from steelyard.shape.orient import consistent, oriented
 from steelyard.shape.points.spacing import Neighbours, areas
 from steelyard.shape.sides.discs import Discs
 from steelyard.shape.sides.sheets import sheet_planes
 from steelyard.shape.sides.tree import Tree
 from steelyard.shape.sides.winding import Sight
+from steelyard.shape.sites import Sites
 from steelyard.spatial import Pose, Rotation
+from steelyard.workshop.sheets import sheet_of
+from steelyard.workshop.solids import rod
 
 
 def ball(points: int = 600, radius: float = 0.05, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -138,3 +141,11 @@ def test_planes_of_a_thin_plate_are_those_of_its_sheets(plate: tuple[np.ndarray,
 def test_areas_add_up_on_both_sheets(plate: tuple[np.ndarray, np.ndarray]) -> None:
     xyz, normal = plate
     assert areas(Neighbours.of(xyz), normal).sum() == pytest.approx(2 * 0.1 * 0.05, rel=0.25)
+
+
+@pytest.mark.parametrize(("points", "seed"), [(260, 4), (400, 7)])
+def test_steps_on_few_points_of_a_wire_do_not_grow_beyond_all_numbers(points: int, seed: int) -> None:
+    """A few blocks of its points tell the length of a step by chance."""
+    wire = sheet_of("wire", rod(1, 0, 200), np.random.default_rng(seed), points)
+    found = consistent(Sites.of(wire.cloud).sight, Sites.of(wire.cloud).spacing)  # a warning of an overflow fails
+    assert np.allclose(np.linalg.norm(found, axis=1), 1, atol=1e-5)

@@ -11,7 +11,7 @@ import pytest
 
 from steelyard.pipelines.shape_in_parts import Shape, shape_of
 from steelyard.shape.mesh import TriangleMesh
-from steelyard.shape.scan import Scan
+from steelyard.shape.scan import Scan, fuse
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose
@@ -72,6 +72,14 @@ def test_what_may_be_a_stand_is_named_with_its_plane_and_the_bar_holds_it() -> N
     plane = json.loads(named.remedy[named.remedy.index("{") :])
     put = replace(views, table=TablePlane(np.array(plane["normal"]), plane["offset_m"]))
     assert shape_of(put).solid.mesh.volume == pytest.approx(EDGE**3, rel=0.05)
+
+
+@pytest.mark.parametrize(("rgb", "named"), [(RED, True), (WHITE, False)])
+def test_a_stand_that_is_largely_covered_is_told_by_its_colour(rgb: tuple[int, int, int], named: bool) -> None:
+    """Its bare face is not six times what stands on it: of one colour they may be one body."""
+    views = seen(painted((block(0.06, 0.05, 0.05, 0.03), rgb), (block(0.13, 0.15, 0.03), WHITE)), 0.03)
+    assert ("table-in-cloud" in {finding.code for finding in fuse(views).findings}) == named
+    assert "table-in-cloud" not in {finding.code for finding in fuse(replace(views, rgb=None)).findings}
 
 
 @pytest.mark.parametrize(("x", "y", "high"), [(0.30, 0.26, 0.025), (0.40, 0.30, 0.018)])

@@ -14,6 +14,7 @@ from steelyard.shape.points.spacing import areas
 from steelyard.shape.sides.discs import Discs
 from steelyard.shape.sides.layers import Layers
 from steelyard.shape.sides.ties import Ties
+from steelyard.shape.sides.tree import Tree
 from steelyard.shape.sides.walls import Wall
 from steelyard.shape.sides.winding import Sight
 from steelyard.shape.sites import Sites
@@ -21,7 +22,9 @@ from steelyard.shape.sites import Sites
 DEPTH = 0.4  # of a disc, in sides of the square that it stands for
 _STEPS = 15
 _WIDEST, _NARROWEST = 2.0, 0.25  # width of the softened dipoles, first and last, in spacings
-_SAMPLED = 4  # one block of points in so many gives the length of a step
+# One block of points in so many gives the length of a step, but no fewer blocks: those of a wire's 300 points tell a
+# length by chance, and steps grew beyond all numbers.
+_SAMPLED, _FEWEST = 4, 32
 _SIGN_STEPS = 10
 _FREE = 4  # steps before signs are driven to plus or minus one
 _SWEEPS, _KEPT = 4, 0.3
@@ -82,12 +85,13 @@ def consistent(sight: Sight, spacing: float) -> Array:
     Each step moves the dipoles toward a winding number of 1/2 at every point, then turns them against the gradient of
     that number, lengths kept; the softening narrows from step to step. Source: Lin, Shi, Liu 2024, algorithm 1.
     """
-    tree, sampled = sight.sources, sight.targets.of_blocks(_SAMPLED)
+    tree, every = sight.sources, _every(sight.targets)
+    sampled = sight.targets.of_blocks(every)
     dipoles: Any = np.zeros((3, len(tree.order)), np.float32)
     found: Any = np.zeros(len(tree.order), np.float32)
     for width in spacing * np.linspace(_WIDEST, _NARROWEST, _STEPS):
         push = sight.adjoint(np.float32(0.5) - found, width)
-        moved = sight.winding(push, width, _SAMPLED)
+        moved = sight.winding(push, width, every)
         dipoles = dipoles + _length(push, moved[sampled]) * push
         found, gradient = sight.winding_and_gradient(dipoles, width)
         dipoles = -np.linalg.norm(dipoles, axis=0) * _units(gradient)
@@ -103,7 +107,8 @@ def on_sheets(sites: Sites, first: Array, wall: Wall | None = None, layers: Laye
     thickness, what lies between sheets so far apart is in the solid; where they are two layers, these face apart.
     """
     xyz, near, sight, spacing = sites.xyz, sites.near, sites.sight, sites.spacing
-    tree, order, sampled = sites.tree, sites.tree.order, sites.tree.of_blocks(_SAMPLED)
+    tree, order, every = sites.tree, sites.tree.order, _every(sites.tree)
+    sampled = tree.of_blocks(every)
     plane, link = sites.sheets(layers)
     ties = Ties.of(xyz, plane, near.index, link, sites.delaunay, spacing)
     if wall:
@@ -112,7 +117,7 @@ def on_sheets(sites: Sites, first: Array, wall: Wall | None = None, layers: Laye
     discs = Discs.on(tree, plane, np.full(len(xyz), _SPREAD_AREA * spacing**2), DEPTH, _JUMP * spacing).response(sight)
     for step in range(_SIGN_STEPS):
         push = discs.adjoint(np.float32(0.5) - discs.winding(sign[order]))
-        sign[order] += _length(push, discs.winding(push, _SAMPLED)[sampled]) * push
+        sign[order] += _length(push, discs.winding(push, every)[sampled]) * push
         sign = ties.spread(np.clip(sign, -1, 1), _SWEEPS, _KEPT)
         if step >= _FREE:
             sign = np.clip(2 * sign, -1, 1)
@@ -149,6 +154,11 @@ def ties_between(sites: Sites, normals: Array, layers: Layers | None) -> Ties:
     plane, link = sites.sheets(layers)
     index, sign = sites.near.index, np.sign((plane * normals).sum(1))
     return Ties.of(sites.xyz, normals, index, link * sign[:, None] * sign[index], sites.delaunay, sites.spacing)
+
+
+def _every(tree: Tree) -> int:
+    """Return which blocks of the points of a tree give the length of a step: one in so many."""
+    return min(max((len(tree.blocks) - 1) // _FEWEST, 1), _SAMPLED)
 
 
 def _length(push: Any, moved: Any) -> np.float32:
