@@ -300,6 +300,13 @@ def test_what_encloses_nothing(xyz: np.ndarray, words: str) -> None:
         enclose(Cloud(xyz))
 
 
+def test_a_bowl_seen_from_above_alone_encloses_nothing() -> None:
+    xy = np.random.default_rng(0).uniform(-0.05, 0.05, (2000, 2))
+    bowl = np.column_stack([xy, 0.3 * (xy**2).sum(1)])
+    with pytest.raises(BadValue, match=r"the points enclose nothing: .*\. Scan the object from all sides"):
+        enclose(Cloud(bowl, normals=np.tile([0.0, 0.0, 1.0], (len(bowl), 1))))
+
+
 def test_numbers_that_are_none_are_bad_input(brick: Sheet) -> None:
     xyz = brick.cloud.xyz.copy()
     xyz[7, 1] = np.nan
