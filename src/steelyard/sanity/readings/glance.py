@@ -50,6 +50,7 @@ class Glance:
     dead          channels [tau, f] of S that do not measure; their wrench is zero
     position      (N, 3) [m] of the S origin in W; None where no channel tells it
     kept          (N,) the M rows that are fitted, which lie in no hole; None where all are
+    calm          (L,) rows of the wrench's stream that lie in no knock; None for a table
     """
 
     wrench: Array
@@ -64,6 +65,7 @@ class Glance:
     dead: tuple[bool, ...] = (False,) * 6
     position: Array | None = None
     kept: Mask | None = None
+    calm: Mask | None = None
 
     def __len__(self) -> int:
         return len(self.wrench)
@@ -145,12 +147,23 @@ def angular_velocity(rotation: Array, rate: float) -> Array:
     return np.asarray(0.5 * np.stack([change[:, i, j] - change[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], 1))
 
 
-def glance(recording: Recording) -> Glance | None:
-    """Return the rows, or None where the recording has no wrench, no direction of gravity, or next to no rows."""
+def glance(recording: Recording, like: Glance | None = None) -> Glance | None:
+    """Return the rows, or None where the recording has no wrench, no direction of gravity, or next to no rows.
+
+    like  what was seen of the same wrench beside other poses, or in other axes: its knocks are not sought again
+    """
     stream = recording.stream_of("force", "torque")
     if stream is None:
         return None
-    return _of_table(recording, stream) if stream.time is None else _of_clocks(recording, stream)
+    if stream.time is None:
+        return _of_table(recording, stream)
+    calm = None if like is None else like.calm
+    return _of_clocks(recording, stream, _calm(stream) if calm is None else calm)
+
+
+def _calm(stream: Stream) -> Mask:
+    """Return the rows (L,) of a stream of forces and torques that lie in no knock."""
+    return ~inside(stream.sampled, merged(*(bursts(stream.sampled, stream.channels[part]) for part in _PARTS)))
 
 
 def in_axes(recording: Recording, world: Collection[str]) -> Recording:
@@ -229,7 +242,7 @@ def _pulls(recording: Recording, on_rows: OnRows, wrench: Array) -> tuple[Array 
     return pull, mirrored
 
 
-def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
+def _of_clocks(recording: Recording, stream: Stream, calm: Mask) -> Glance | None:
     timed = [s for s in recording.streams if s.time is not None and len(s) > 3]
     used = [s for s in timed if s is stream or {"rotation", "gravity", "specific_force", "position"} & set(s.channels)]
     if stream not in used:
@@ -245,8 +258,6 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
         return resampled(s.sampled, values, grid)
 
     raw = Felt.of(stream, recording.wrench_sign)
-    knocks = merged(*(bursts(stream.sampled, stream.channels[part]) for part in _PARTS))
-    calm = ~inside(stream.sampled, knocks)
     wrench = np.where(recording.dead, 0.0, resampled(stream.sampled[calm], raw.values[calm], grid))
     seen = replace(recording, streams=tuple(used))
     posed = _posed(seen, on_grid, wrench)
@@ -260,7 +271,7 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     felt = None if rotation is None else _first(seen, "specific_force", on_grid)
     return Glance(
         wrench, rotation, pull, acceleration, block if whole else block[kept], rate, raw.world, mirrored, felt,
-        recording.dead, place, None if whole else kept,
+        recording.dead, place, None if whole else kept, calm,
     )  # fmt: skip
 
 

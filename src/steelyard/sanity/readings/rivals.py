@@ -38,6 +38,8 @@ BY_TORQUE, BESIDE = 0.1, 0.5
 TORQUES_TOO = 0.3
 # Beyond this no base is crooked [rad].
 STEEP = np.radians(60.0)
+# A way to misread rotations, the recording with that undone, and what is seen of it.
+Meant = tuple[Misread, Recording, Glance]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +100,10 @@ def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Readin
             and (r.view is None or r.fit.torque_share < TORQUES_TOO)
         ]
 
-    one = able((*_rivals(recording, view, given.gravity), *_in_other_axes(recording, view, given)), bar)
+    meant = tuple(_meant(recording, view))
+    one = able((*_rivals(meant, view, given.gravity), *_in_other_axes(recording, view, given)), bar)
     # Of two mistakes each must leave much less than the other alone does.
-    both = () if one else able(_misread_in_other_axes(recording, given.gravity), MUCH_BETTER * bar)
+    both = () if one else able(_misread_in_other_axes(meant, given.gravity), MUCH_BETTER * bar)
     best = min(one or both, key=_unlikely, default=None)
     return best if best is not None and not outdone(best, view, given.gravity) else None
 
@@ -130,21 +133,18 @@ def misread_rotations(recording: Recording, view: Glance, given: Reading) -> Ite
     """Yield the other ways to read rotations that explain forces in W as well, with torques in W, too; else none."""
     if view.world != {"torque", "force"}:
         return
-    for rival in _rivals(recording, view, given.gravity):
+    for rival in _rivals(_meant(recording, view), view, given.gravity):
         as_well = rival.fit.force_share < 1.2 * given.fit.force_share + 1e-3 and rival.fit.sign == given.fit.sign
         if rival.misread is not None and as_well:
             yield replace(rival, by_torque=True)
 
 
-def _rivals(recording: Recording, view: Glance, gravity: Array) -> Iterator[Reading]:
-    """Yield the ways in which rotation or gravity are commonly misread.
-
-    Rotations are put right row by row before they are averaged: misread ones may leap.
-    """
+def _rivals(others: Iterable[Meant], view: Glance, gravity: Array) -> Iterator[Reading]:
+    """Yield the ways in which rotation (`others`) or gravity are commonly misread."""
     R = view.rotation
     if R is None:
         return
-    for misread, _, meant in _meant(recording):
+    for misread, _, meant in others:
         yield reading_of(meant if misread.whole else view, misread.words, gravity, meant.rotation, misread)
     size = float(np.linalg.norm(gravity))
     for axis in range(3):
@@ -162,7 +162,7 @@ def _in_other_axes(recording: Recording, view: Glance, given: Reading) -> Iterat
     if any(recording.dead) or given.rotation is None:
         return
     both = frozenset(() if "force" in view.world else ("torque", "force"))
-    views = {world: glance(in_axes(recording, world)) for world in (both, both ^ {"torque"})}
+    views = {world: glance(in_axes(recording, world), view) for world in (both, both ^ {"torque"})}
     found = [
         replace(reading_of(other, _axes_in_words(world), given.gravity, given.rotation), view=other)
         for world, other in views.items()
@@ -172,18 +172,21 @@ def _in_other_axes(recording: Recording, view: Glance, given: Reading) -> Iterat
     yield from (r for r in found[1:] if r.fit.torque_share < BESIDE * found[0].fit.torque_share)
 
 
-def _misread_in_other_axes(recording: Recording, gravity: Array) -> Iterator[Reading]:
+def _misread_in_other_axes(others: Iterable[Meant], gravity: Array) -> Iterator[Reading]:
     """Yield the wrench in other axes beside rotations that are misread, too: neither alone explains such a log."""
-    for misread, put, meant in _meant(recording):
+    for misread, put, meant in others:
         for rival in _in_other_axes(put, meant, reading_of(meant, "", gravity, meant.rotation)):
             yield replace(rival, words=f"{rival.words}, and {misread.words}", misread=misread)
 
 
-def _meant(recording: Recording) -> Iterator[tuple[Misread, Recording, Glance]]:
-    """Yield the ways to misread rotations, and the recording and what is seen of it with each undone."""
+def _meant(recording: Recording, view: Glance) -> Iterator[Meant]:
+    """Yield the ways to misread rotations, and the recording and what is seen of it with each undone.
+
+    Rotations are put right row by row before they are averaged: misread ones may leap.
+    """
     for misread in (*MISREAD, INVERTED):
         put = _put_right(recording, misread)
-        meant = None if put is None else glance(put)
+        meant = None if put is None else glance(put, view)
         if put is not None and meant is not None and meant.rotation is not None:
             yield misread, put, meant
 
