@@ -155,10 +155,7 @@ def glance(recording: Recording, like: Glance | None = None) -> Glance | None:
     stream = recording.stream_of("force", "torque")
     if stream is None:
         return None
-    if stream.time is None:
-        return _of_table(recording, stream)
-    calm = None if like is None else like.calm
-    return _of_clocks(recording, stream, _calm(stream) if calm is None else calm)
+    return _of_table(recording, stream) if stream.time is None else _of_clocks(recording, stream, like)
 
 
 def _calm(stream: Stream) -> Mask:
@@ -242,7 +239,7 @@ def _pulls(recording: Recording, on_rows: OnRows, wrench: Array) -> tuple[Array 
     return pull, mirrored
 
 
-def _of_clocks(recording: Recording, stream: Stream, calm: Mask) -> Glance | None:
+def _of_clocks(recording: Recording, stream: Stream, like: Glance | None) -> Glance | None:
     timed = [s for s in recording.streams if s.time is not None and len(s) > 3]
     used = [s for s in timed if s is stream or {"rotation", "gravity", "specific_force", "position"} & set(s.channels)]
     if stream not in used:
@@ -258,6 +255,7 @@ def _of_clocks(recording: Recording, stream: Stream, calm: Mask) -> Glance | Non
         return resampled(s.sampled, values, grid)
 
     raw = Felt.of(stream, recording.wrench_sign)
+    calm = _calm(stream) if like is None or like.calm is None else like.calm
     wrench = np.where(recording.dead, 0.0, resampled(stream.sampled[calm], raw.values[calm], grid))
     seen = replace(recording, streams=tuple(used))
     posed = _posed(seen, on_grid, wrench)
