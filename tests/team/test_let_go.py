@@ -97,6 +97,23 @@ def test_around_a_change_nobodys_wrench_is_used_nor_the_poses_of_the_one_who_cha
     assert (out.seen[:, [0, 2]] == part.seen[:, [0, 2]]).all()
 
 
+def test_who_pushes_with_next_to_nothing_nearly_all_the_time_bears_no_gripper() -> None:
+    (part,) = stretches(
+        simulate_team(TeamScene(NOISE, sensing="poses", kinds=("motion",), motion_samples=1500), 0).log, {}
+    )
+    light, strays = np.zeros(part.seen.shape, np.bool_), np.array([False, True, False])
+    light[600:1000, 1] = True
+    edge = int(np.ceil(EDGE_S * part.rate))
+    middle = slice(600 + edge, 1000 - edge)
+    for few, gripper in ((20, False), (80, True)):
+        bare = light.copy()
+        bare[990 - few : 990, 1] = False  # as where it brushes the payload
+        out = let_go(part, bare, light, np.where(light, 50.0, 1.0), strays)
+        # The sum of wrenches is no payload's where one bears its gripper alone.
+        assert out.felt[middle, 1].any() != gripper
+        assert out.carries[middle, 1].all() == gripper
+
+
 def test_a_robot_that_bears_little_has_not_let_go_where_its_grasp_slipped() -> None:
     slip = Slip(WHO, np.array([0.008, 0.0, 0.006]), LEAVES)
     scene = TeamScene(NOISE, 4, sensing="poses", motion_samples=2000, slip=slip, squeeze_N=30.0)
