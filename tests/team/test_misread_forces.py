@@ -17,7 +17,7 @@ from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
-from steelyard.team.misread.readings import READINGS, SIGN, Reading, torques_beside
+from steelyard.team.misread.readings import READINGS, SIGN, WrenchReading, torques_beside
 
 POSES = TeamNoise(pose_rad=3e-4, pose_m=2e-4, rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=1.0)
 TURNED = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -220,7 +220,7 @@ def test_readings() -> None:
     np.testing.assert_array_equal(READINGS[0], np.eye(3))
     np.testing.assert_array_equal(READINGS[SIGN], -np.eye(3))
     assert len({X.tobytes() for X in READINGS}) == len(READINGS) == 7 * 48
-    both = Reading(48 + 3, np.eye(3)).words()
+    both = WrenchReading(48 + 3, np.eye(3)).words()
     assert both.startswith("kgf read as N and F")
     for number in (1, 48, 48 + 1):
         first, *others = torques_beside(number)

@@ -16,7 +16,7 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding, percent, quoted
 from steelyard.inertia.regressor import basis
-from steelyard.team.misread.readings import AXES, FACTORS, READINGS, SIGN, Reading, torques_beside
+from steelyard.team.misread.readings import AXES, FACTORS, READINGS, SIGN, WrenchReading, torques_beside
 from steelyard.team.misread.signs import sign_finding
 from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.payload.model import Group, centred, pseudoinverse, scatter, unexplained
@@ -228,22 +228,22 @@ def _unlike(groups: Sequence[Group], D: Array, robot: int, X: Array) -> bool:
     return read > RISES * given
 
 
-def _with_torque(S: Array, D: Array, robot: int, number: int) -> Reading:
+def _with_torque(S: Array, D: Array, robot: int, number: int) -> WrenchReading:
     """Return the reading with that of the torque by which moments balance, as it is given where none is clear."""
     given, *others = torques_beside(number)
     own = slice(12 + 6 * robot, 15 + 6 * robot)
     if not np.trace(S[own, own]) > 0:
         axes = AXES[number % len(AXES)]
-        return Reading(number, axes if np.linalg.det(axes) > 0 else given.torque)
+        return WrenchReading(number, axes if np.linalg.det(axes) > 0 else given.torque)
     if number == SIGN:
-        return Reading(number, -given.torque)
+        return WrenchReading(number, -given.torque)
     E = basis()[1:, :3]
     left = [unexplained(D[:3], E, _turned(S, robot, one.wrench())) for one in (given, *others)]
     best = int(np.argmin(left))
     return (given, *others)[best] if CLEAR * left[best] < left[0] else given
 
 
-def _finding(name: str, reading: Reading, score: float) -> Finding:
+def _finding(name: str, reading: WrenchReading, score: float) -> Finding:
     """Return the finding of forces that were put right."""
     if reading.number == SIGN:
         return sign_finding(name)
@@ -259,7 +259,7 @@ def _undecided(equal: Sequence[tuple[int, int]], names: Sequence[str]) -> Findin
     """Return the finding of forces that fit with more than one reading."""
     who = list(dict.fromkeys(robot for robot, _ in equal))
     robots = quoted((names[robot] for robot in who), " or ")
-    ways = [f"those of '{names[robot]}' as {Reading(number, np.eye(3)).words()}" for robot, number in equal[:3]]
+    ways = [f"those of '{names[robot]}' as {WrenchReading(number, np.eye(3)).words()}" for robot, number in equal[:3]]
     text = (
         f"What robots push does not fit one body as given, and would with the forces of {robots} read otherwise: "
         f"{'; or '.join(ways)}{' or in other ways' if len(equal) > 3 else ''}. Nothing was changed, and the answer is "

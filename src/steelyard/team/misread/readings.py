@@ -31,7 +31,7 @@ SIGN = int(np.argmin(np.abs(READINGS + np.eye(3)).sum((1, 2))))
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class WrenchReading:
     """Reading `number` of the force, and what makes torque of what is given (3, 3)."""
 
     number: int
@@ -86,12 +86,13 @@ class Reading:
         return " ".join(out)
 
 
-def torques_beside(number: int) -> tuple[Reading, ...]:
+def torques_beside(number: int) -> tuple[WrenchReading, ...]:
     """Return the readings of torque that may go with one of the force; that it is right as given is the first."""
     axes = AXES[number % len(AXES)]
     turned = [np.eye(3), axes, *([-axes] if np.linalg.det(axes) < 0 else [])]
     sizes = dict.fromkeys((1.0, float(_SIZES[number // len(AXES), 1])))
-    return tuple(Reading(number, size * X) for size in sizes for X in turned[: 1 if number % len(AXES) == 0 else None])
+    turned = turned[: 1 if number % len(AXES) == 0 else None]
+    return tuple(WrenchReading(number, size * X) for size in sizes for X in turned)
 
 
 def maps_of(names: Sequence[str], D: Array, taken: Array, reading: tuple[int, Array] | None) -> dict[str, Array]:
