@@ -145,9 +145,7 @@ def _hung_rows(stream: Stream) -> Mask:
 
     Poses, or a counter, may go on beside it.
     """
-    none = np.zeros(len(stream), bool)
-    noisy = {q: stream.channels[q] for q in NOISY if q in stream.channels}
-    return _any_of(_hung(columns_of(replace(stream, channels=noisy)), stream), none) if noisy else none
+    return _hung(stream, NOISY)[0]
 
 
 def _hung_poses(stream: Stream) -> Mask:
@@ -156,37 +154,31 @@ def _hung_poses(stream: Stream) -> Mask:
     Poses without noise stand still at every rest, and jump after one where parts of logs were joined: they are noisy
     where each stretch without change ends in a jump.
     """
-    none = np.zeros(len(stream), bool)
-    if "rotation" not in stream.channels:
-        return none
-    poses = {q: stream.channels[q] for q in _POSE if q in stream.channels}
-    held = _hung(columns_of(replace(stream, channels=poses)), stream)
-    return _any_of(held, none) if all(jumps for _, _, jumps in held) else none
+    rows, always = _hung(stream, _POSE)
+    return rows if always and "rotation" in stream.channels else np.zeros(len(stream), bool)
 
 
-def _any_of(held: list[tuple[int, int, bool]], none: Mask) -> Mask:
-    """Return the rows (N,) of the stretches that jump after."""
-    rows = none.copy()
-    for start, stop, jumps in held:
-        rows[start:stop] |= jumps
-    return rows
-
-
-def _hung(values: Array, stream: Stream) -> list[tuple[int, int, bool]]:
-    """Return the first row and the last + 1 of long stretches of equal values (N, K), and whether they jump after.
+def _hung(stream: Stream, quantities: tuple[str, ...]) -> tuple[Mask, bool]:
+    """Return the rows (N,) of long stretches in which nothing of these changes and that jump after; and if all jump.
 
     None are where values repeat elsewhere, too, or stand still more than three times.
     """
+    rows = np.zeros(len(stream), bool)
+    channels = {q: stream.channels[q] for q in quantities if q in stream.channels}
+    values = columns_of(replace(stream, channels=channels)) if channels else np.empty((len(stream), 0))
     if stream.time is None or not values.shape[1]:
-        return []
+        return rows, True
     same = (values[1:] == values[:-1]).all(1)
     long = lasting(same, _rows_needed(stream.time))
     held = runs(long)
     if not 1 <= len(held) <= 3 or same[~long].mean() > 0.05:
-        return []
+        return rows, True
     steps = np.abs(np.diff(values, axis=0))
     typical = np.maximum(np.median(steps[~long], 0), 1e-300)
-    return [(a, b + 1, b < len(steps) and bool((steps[b] > 5 * typical).any())) for a, b in held.tolist()]
+    jumping = [(a, b) for a, b in held.tolist() if b < len(steps) and (steps[b] > 5 * typical).any()]
+    for first, last in jumping:
+        rows[first : last + 1] = True
+    return rows, len(jumping) == len(held)
 
 
 def _frozen_rows(column: Array, time: Array) -> Mask:
