@@ -17,6 +17,7 @@ from steelyard.pipelines.rows import FitRows
 from steelyard.sanity.after import of_answer, of_rows, rotation_of, row_noise
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.biases import drift_of, room_fit
+from steelyard.sanity.fitted.gravity import levelled
 from steelyard.sanity.fitted.load_motion import examine_masses, examine_motion
 from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
 from steelyard.sanity.fitted.sensor_matrix import examine_sensor
@@ -54,13 +55,19 @@ def looked_back(
     return load, estimate, late
 
 
-def room_bias_allowed(load: Load, estimate: Estimate, rows: FitRows) -> Estimate:
-    """Return the estimate with bars that hold how well a bias that keeps its direction in the room is known."""
-    rotation = rotation_of(load.log, rows.aligned)
-    if rows.room is None or rotation is None:
+def room_allowed(load: Load, estimate: Estimate, rows: FitRows) -> Estimate:
+    """Return the estimate with bars that hold how well a bias that keeps its direction in the room, and gravity's own
+    direction where that was estimated, are known."""
+    log, rotation = load.log, rotation_of(load.log, rows.aligned)
+    if rotation is None:
         return estimate
-    again = (load.of(without(error, load.log, rotation)) for error in rows.room.bias.errors())
-    return estimate.allowing(*(one.parameters.vector - estimate.parameters.vector for one in again))
+    biases = () if rows.room is None else rows.room.bias.errors()
+    pulls = () if rows.level is None else rows.level.within
+    others = [
+        *(without(error, log, rotation) for error in biases),
+        *(levelled(log, rotation, gravity, rows.aligned.acceleration_from) for gravity in pulls),
+    ]
+    return estimate.allowing(*(load.of(other).parameters.vector - estimate.parameters.vector for other in others))
 
 
 def pulled(

@@ -27,7 +27,7 @@ from steelyard.sanity.after import rotation_of
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.biases import SeenRoomBias, examine_room_bias
 from steelyard.sanity.fitted.full_fit import force_left
-from steelyard.sanity.fitted.gravity import fitted_gravity, levelled
+from steelyard.sanity.fitted.gravity import FittedGravity, fitted_gravity, levelled
 from steelyard.sanity.fitted.misplaced import Misplaced, examine_place, misplaced, of_sensor
 from steelyard.sanity.fitted.sensor_matrix import turn_of
 from steelyard.sanity.holding.consensus import FINE
@@ -59,7 +59,7 @@ class FitRows:
 
     log         the rows
     aligned     what they were taken from
-    level       note on the direction of gravity, where that was asked for
+    level       the direction of gravity, where that was asked for
     unmeasured  note on rows that were left out since their acceleration is not known
     touched     findings about time in which a hand or another load spoiled the wrench
     left_out    that time, (start, end) [s] on the wrench clock, where its rows were left out
@@ -71,7 +71,7 @@ class FitRows:
 
     log: MotionLog
     aligned: Aligned
-    level: tuple[str, ...]
+    level: FittedGravity | None
     unmeasured: tuple[str, ...]
     touched: tuple[Finding, ...]
     left_out: Spans = ()
@@ -93,7 +93,9 @@ class FitRows:
     @property
     def notes(self) -> tuple[str, ...]:
         """What there is to say about gravity and about rows whose acceleration is not known."""
-        return (*self.level, *self.unmeasured)
+        if self.level is None:
+            return self.unmeasured
+        return (f"{GRAVITY_FOUND} {self.level.words} off the direction given", *self.unmeasured)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,15 +228,15 @@ class Reading:
                 log, touched = log.rows(keep), (finding,)
         return replace(rows, log=log, touched=touched, left_out=left_out)
 
-    def _aligned(self, how: AlignOptions) -> tuple[Aligned, tuple[str, ...]]:
-        """Return the recording aligned, with accelerations of S, and a note on the direction of gravity that was found.
+    def _aligned(self, how: AlignOptions) -> tuple[Aligned, FittedGravity | None]:
+        """Return the recording aligned, with accelerations of S, and the direction of gravity where that was asked for.
 
         Aligning takes the accelerations of poses to S; those of an accelerometer or a table come as they are.
         """
         aligned = align(self.recording, how)
         if any(how.place) and (aligned.acceleration_from == MEASURED or aligned.log.time is None):
             aligned = replace(aligned, log=of_sensor(aligned.log, np.array(how.place)))
-        return (aligned, ()) if self.options.gravity == "given" else _levelled(aligned, self.recording.gravity)
+        return (aligned, None) if self.options.gravity == "given" else _levelled(aligned, self.recording.gravity)
 
 
 def rows_as_given(
@@ -272,13 +274,13 @@ def since_start(log: MotionLog, recording: Recording) -> MotionLog:
     return log if log.time is None else replace(log, time=log.time - start)
 
 
-def _levelled(aligned: Aligned, gravity: Array) -> tuple[Aligned, tuple[str, ...]]:
-    """Return the log for the direction of gravity that it shows itself, and a note; `gravity` (3,) as it was given."""
+def _levelled(aligned: Aligned, gravity: Array) -> tuple[Aligned, FittedGravity]:
+    """Return the log for the direction of gravity that it shows itself, and that; `gravity` (3,) as it was given."""
     if aligned.rotation is None:
         raise BadValue('gravity "unknown" needs the rotation of the sensor; the log has none. Add a rotation stream.')
     rotation = aligned.rotation.matrix
     found = fitted_gravity(aligned.log, rotation, gravity, aligned.acceleration_from)
-    if found is None:
+    if found is None or len(found.tilts) < 2:
         raise CannotAnswer("The log does not show the direction of gravity: turn the sensor about two different axes.")
     log = levelled(aligned.log, rotation, found.gravity, aligned.acceleration_from)
-    return replace(aligned, log=log), (f"{GRAVITY_FOUND} {found.words} off the direction given",)
+    return replace(aligned, log=log), found

@@ -13,16 +13,32 @@ from steelyard.sanity.words import direction_words
 from steelyard.spatial import Rotation
 
 _ROUNDS, _FEWEST_ROWS = 4, 8
+# A tilt is told where a body of another mass and a bias leave this share of what it does: turns about one axis alone
+# leave nothing of the tilt that makes the weight across that axis larger. What is told badly has wide bars.
+TOLD = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class FittedGravity:
-    """Gravity (3,) [m/s^2] in W that fits best, its angle to the given one with std [rad], residual variance left."""
+    """The direction of gravity that fits best.
+
+    gravity    (3,) [m/s^2] in W
+    angle      [rad] to that given, and its standard deviation
+    left       residual variance, as a share of that with gravity as given
+    tilts      (k, 3) [rad] turns in W of one standard deviation each, independent of one another: two where the log
+               tells the direction, one where it tells one angle only
+    """
 
     gravity: Array
     angle: float
     angle_std: float
     left: float
+    tilts: Array
+
+    @property
+    def within(self) -> Array:
+        """Gravity (k, 3) as it would be one standard deviation off."""
+        return Rotation.exp(self.tilts).apply(self.gravity)
 
     @property
     def words(self) -> str:
@@ -48,16 +64,21 @@ def fitted_gravity(log: MotionLog, rotation: Array, gravity: Array, acceleration
     for _ in range(_ROUNDS):
         # The weights are kept.
         rows = replace(given, columns=Rows.columns_of(replace(given.log, gravity=np.swapaxes(R, 1, 2) @ found)))
-        columns, axes = _visible(rows, rows.tilting(phi, R, found))
-        if columns is None:
+        tilts = _across(found)
+        columns = rows.tilting(phi, R, found) @ tilts
+        told = rows.told(columns, TOLD)
+        if not told.size:
             return None
-        fit = rows.solve(columns, jackknife=True)
+        axes = tilts @ told
+        fit = rows.solve(columns @ told, jackknife=True)
         turn, spread = axes @ fit.extra, np.abs(axes) @ fit.extra_std
         found, phi = Rotation.exp(turn).apply(found), fit.phi
         if np.linalg.norm(turn) < 1e-4:
             break
+    variance, own = np.linalg.eigh(fit.extra_covariance)
+    tilts = (axes @ own * np.sqrt(np.maximum(variance, 0))).T
     angle = float(np.arccos(np.clip(found @ gravity / (gravity @ gravity), -1, 1)))
-    return FittedGravity(found, angle, float(np.linalg.norm(spread)), fit.beside(level))
+    return FittedGravity(found, angle, float(np.linalg.norm(spread)), fit.beside(level), tilts)
 
 
 def levelled(log: MotionLog, rotation: Array, gravity: Array, acceleration_from: str) -> MotionLog:
@@ -68,10 +89,6 @@ def levelled(log: MotionLog, rotation: Array, gravity: Array, acceleration_from:
     return replace(log, gravity=turned, acceleration=log.acceleration - log.gravity + turned)
 
 
-def _visible(rows: Rows, columns: Array) -> tuple[Array | None, Array]:
-    """Return tilt columns (N, 6, k) along the axes (3, k) that the log shows beside a free bias."""
-    centred = (columns - columns.mean(0)) * np.sqrt(rows.weights)[:, :, None]
-    scatter = np.einsum("nik,nil->kl", centred, centred)
-    values, axes = np.linalg.eigh(scatter)
-    kept = axes[:, values > 0.02 * max(float(values[-1]), 1e-12)]
-    return (columns @ kept, kept) if kept.shape[1] else (None, kept)
+def _across(gravity: Array) -> Array:
+    """Return the two axes (3, 2) about which a turn tilts gravity (3,): those across it."""
+    return np.asarray(np.linalg.svd(gravity[None])[2][1:].T)
