@@ -12,6 +12,7 @@ from sanity.held_poses import BODY, swaying
 from steelyard.findings import UNMEASURED
 from steelyard.pipelines.held_object import identify
 from steelyard.simulate.handling import motion_arrays
+from steelyard.workshop.catalogue import build
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -25,6 +26,16 @@ def test_without_positions_slow_turns_tell_no_inertia(seed: int) -> None:
     (said,) = (f for f in found.findings if f.code == "inertia-not-identified")
     assert said.remedy == UNMEASURED["inertia-not-identified"]
     assert abs(found.mass / BODY.mass - 1) < 0.02
+
+
+def test_with_parts_their_shape_tells_it() -> None:
+    (stream,) = swaying(0, 3.0, 0.1).streams
+    turned = {q: v for q, v in stream.channels.items() if q != "position"}
+    tool = build("hammer")
+    recording = replace(swaying(0), streams=(replace(stream, channels=turned),), object_pose=tool.X_OS.inverse())
+    found = identify(recording, parts=tool.parts)
+    assert found.inertia_com is not None
+    assert np.abs(np.diag(found.inertia_com - BODY.inertia_com)).max() < 0.2 * np.trace(BODY.inertia_com)
 
 
 @pytest.mark.parametrize("seed", range(3))
