@@ -94,6 +94,27 @@ def test_the_tool_is_taken_away_with_parts_and_without(bar: Parts, held: Inertia
     assert (max(inertia) < 5e-5) == parts_given
 
 
+@pytest.mark.parametrize(("of_tool", "of_load", "force"), [("none", "free", 2.0), ("free", "none", 0.0)])
+def test_a_run_whose_sensor_is_tared_shares_no_bias(
+    held: InertialParameters, of_tool: str, of_load: str, force: float
+) -> None:
+    tool = api.identify(handling_log(GRIPPER, noise="low", seed=0), Options(bias=of_tool))  # type: ignore[arg-type]
+    log = with_gripper(held, 50)
+    log = replace(log, wrench=log.wrench + force * np.repeat([0.0, 1.0], 3))
+    found = api.identify(log, Options(bias=of_load), tool=tool)  # type: ignore[arg-type]
+    assert "bias-drift" not in found.codes()
+    assert not any("bias is shared" in note for note in found.notes)
+    assert (np.abs(found.parameters.vector - held.vector)[:4] < 4 * np.sqrt(np.diag(found.covariance)[:4])).all()
+
+
+def test_a_bias_that_changed_between_the_runs_is_named_and_not_shared(held: InertialParameters) -> None:
+    tool, log = api.identify(handling_log(GRIPPER, noise="low", seed=0)), with_gripper(held, 50)
+    found = api.identify(replace(log, wrench=log.wrench + 2.0 * np.repeat([0.0, 1.0], 3)), tool=tool)
+    assert "bias-drift" in found.codes()
+    assert (np.abs(found.parameters.vector - held.vector)[:4] < 4 * np.sqrt(np.diag(found.covariance)[:4])).all()
+    assert any("bias is shared" in note for note in api.identify(log, tool=tool).notes)
+
+
 def test_the_tool_may_be_known_exactly(bar: Parts, held: InertialParameters) -> None:
     tool = replace(api.identify(handling_log(GRIPPER, noise="low", seed=0)), parameters=GRIPPER)
     exact = replace(tool, covariance=np.zeros((10, 10)))

@@ -128,7 +128,7 @@ class Load:
             return estimate.noted(f"a tool of {self.tool.mass:.4g} kg was taken away; each run had a bias of its own")
         prior = bias_prior(self.tool) if self.bias.free else None
         if prior is None:
-            return without_tool(estimate, self.tool, shared=False).noted("the tool's run tells nothing about the bias")
+            return without_tool(estimate, self.tool, shared=False)
         same, p = shares_bias(self.tool, estimate)
         if not same:
             return without_tool(estimate, self.tool, shared=False).with_findings(different_bias(p))
