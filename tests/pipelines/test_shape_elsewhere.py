@@ -7,6 +7,7 @@ import pytest
 
 import steelyard as sy
 from steelyard.identify.estimate import Estimate
+from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import KNOWN_PLACE
 from steelyard.parts.parts import Parts
@@ -114,6 +115,16 @@ def test_one_that_is_less_far_off_is_named_and_in_the_bars(
     off = np.abs(found.parameters.inertia_com - truth.inertia_com)[np.triu_indices(3)]
     assert found.parts
     assert (off < 3 * found.std[4:]).all()
+
+
+def test_a_gripper_in_the_log_is_no_place_of_the_object() -> None:
+    gripper = InertialParameters.from_com(1.5, [0.0, 0.0, -0.15], np.diag([4e-3, 4e-3, 2e-3]))
+    tool = sy.identify(handling_log(gripper, noise="moderate", seed=2))
+    held = InertialParameters(TOOL.truth_in_sensor.vector + gripper.vector)
+    log = handling_log(held, "paper", noise="moderate", seed=1)
+    found = identify_rows(log, tool=tool, parts=TOOL.parts, pose=shifted(20, 0, 0))
+    assert "part-not-homogeneous" in found.codes()
+    assert found.parts
 
 
 @pytest.mark.parametrize("kind", ["mesh", "scan"])
