@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import steelyard as sy
+from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
@@ -115,6 +118,18 @@ def test_one_that_is_less_far_off_is_named_and_in_the_bars(
     off = np.abs(found.parameters.inertia_com - truth.inertia_com)[np.triu_indices(3)]
     assert found.parts
     assert (off < 3 * found.std[4:]).all()
+
+
+def test_a_shape_is_kept_where_the_log_alone_has_no_answer() -> None:
+    turns = Rotation.exp(np.array([[0.0, 0, 0], [1.5, 0, 0]]))
+    poses = MotionLog.of_poses(np.zeros((2, 6)), turns.inverse().apply([0, 0, -9.81]))
+    noise = np.random.default_rng(0).normal(size=(2, 6)) * np.repeat([2e-3, 3e-2], 3)
+    poses = replace(poses, wrench=poses.predicted(TOOL.truth_in_sensor.vector) + noise)
+    with pytest.raises(CannotAnswer):
+        sy.identify(poses)
+    found = identify_rows(poses, parts=TOOL.parts, pose=shifted(20, 0, 0), pose_std=KNOWN_PLACE)
+    assert "part-not-homogeneous" in found.codes()
+    assert abs(found.mass - TOOL.truth_in_sensor.mass) < 3 * found.std[0]
 
 
 def test_a_gripper_in_the_log_is_no_place_of_the_object() -> None:
