@@ -14,12 +14,15 @@ from steelyard import api
 from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording, Stream
 from steelyard.parts.parts import Parts
+from steelyard.pipelines.held_object import identify
 from steelyard.pipelines.options import Options
 from steelyard.simulate.handling import handling_log
 from steelyard.spatial import Pose, Rotation
 
 DENSITY = np.array([7800.0, 7800, 1000, 1000])
+BIAS = np.array([0.1, -0.2, 0.05, 1.5, -2.0, 0.7])
 GRIPPER = InertialParameters.from_com(0.9, [0.001, 0.002, 0.06], np.diag([1.5e-3, 1.6e-3, 8e-4]))
 
 
@@ -113,6 +116,25 @@ def test_a_bias_that_changed_between_the_runs_is_named_and_not_shared(held: Iner
     assert "bias-drift" in found.codes()
     assert (np.abs(found.parameters.vector - held.vector)[:4] < 4 * np.sqrt(np.diag(found.covariance)[:4])).all()
     assert any("bias is shared" in note for note in api.identify(log, tool=tool).notes)
+
+
+def at_rest(body: InertialParameters, sign: int, seed: int) -> Recording:
+    """Return a table of still poses whose raw channels have a wrench of this sign, and BIAS."""
+    rng = np.random.default_rng(seed)
+    turns = Rotation.exp(rng.normal(size=(20, 3)))
+    felt = body.wrench(turns.inverse().apply([0.0, 0.0, -9.81]))
+    raw = BIAS + sign * np.hstack([felt.torque, felt.force]) + rng.normal(size=(20, 6)) * np.repeat([1e-3, 1e-2], 3)
+    channels = {"force": raw[:, 3:], "torque": raw[:, :3], "rotation": turns.matrix}
+    return Recording((Stream("poses", channels, poses=True),), np.array([0, 0, -9.81]), wrench_sign=sign)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_shared_bias_is_that_of_the_raw_channels(held: InertialParameters, sign: int) -> None:
+    both = InertialParameters(held.vector + GRIPPER.vector)
+    found = identify(at_rest(both, sign, 1), tool=at_rest(GRIPPER, sign, 2))
+    assert any("bias is shared" in note for note in found.notes)
+    np.testing.assert_allclose(found.wrench_bias, BIAS, atol=0.02)
+    assert (np.abs(found.parameters.vector - held.vector)[:4] < 4 * np.sqrt(np.diag(found.covariance)[:4])).all()
 
 
 def test_the_tool_may_be_known_exactly(bar: Parts, held: InertialParameters) -> None:
