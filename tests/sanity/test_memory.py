@@ -74,3 +74,10 @@ def test_rows_that_share_an_offset_count_as_one(poses: int) -> None:
         off.append(np.append(found.mass - float(BODY.mass), found.com - BODY.com) / found.std[:4])
     assert 0.6 < float(np.sqrt(np.mean(np.square(off)))) < 1.4
     assert f"one mean for each pose was read, {poses} in all" in " ".join(found.notes)
+
+
+def test_channels_that_do_not_measure_hide_no_offsets() -> None:
+    (stream,) = with_offsets(0, 24).streams
+    silent = replace(stream, channels={**stream.channels, "torque": np.zeros((len(stream), 3))})
+    (note,) = examine_memory(replace(with_offsets(0, 24), streams=(silent,))).notes
+    assert note.startswith("poses scatter")
