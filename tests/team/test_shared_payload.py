@@ -95,6 +95,12 @@ def test_loggers_need_not_start_and_end_together(names: tuple[str, ...], rows: s
     assert not list(missing_rows(of_rows(trial().log, names, rows)))
 
 
+@pytest.mark.parametrize(("rows", "said"), [(130, 0), (80, 1)])
+def test_what_is_lost_of_a_short_recording_is_said_from_a_second_on(rows: int, said: int) -> None:
+    brief = of_rows(trial().log, trial().log.names, slice(0, 200))
+    assert len(list(missing_rows(of_rows(brief, ("robot1",), slice(0, rows))))) == said
+
+
 def without(log: TeamLog, number: int, name: str, *channels: str) -> TeamLog:
     """Return the log without one robot's channels in one recording, or without its track where none are named."""
     recordings = list(log.recordings)
@@ -158,6 +164,26 @@ def test_rows_that_are_not_there_are_said_once_for_each_robot() -> None:
     assert said.message.startswith("'robot1' lacks about 2")
     assert said.message.count("% of the rows of") == len(log.recordings)
     assert "rows-missing" not in identify_team(log).codes()
+
+
+def test_rows_that_repeat_the_one_before_are_not_missing_as_well() -> None:
+    *others, motion = trial().log.recordings
+    track = motion.tracks["robot1"]
+    for repeated, said in ((300, 0), (0, 1)):
+        kept = replace(track.rows(np.arange(len(track)) % 5 > 0), repeated=repeated)
+        log = trial().log.with_recordings(*others, replace(motion, tracks={**motion.tracks, "robot1": kept}))
+        assert len(list(missing_rows(log))) == said
+
+
+def test_where_nobody_else_has_rows_none_are_short() -> None:
+    alone = without(without(trial().log, 4, "robot1"), 4, "robot2")
+    assert len(alone.recordings[4].tracks) == 1
+    assert not list(missing_rows(alone))
+
+
+def test_a_channel_of_which_nothing_was_logged_is_said() -> None:
+    (said,) = missing_rows(with_gap(trial().log, 0, 1500))
+    assert said.message == "'robot1' lacks numbers in 1500 of 1500 rows of 'motion-5' (force)."
 
 
 def test_stamps_in_pairs_lack_nothing() -> None:
