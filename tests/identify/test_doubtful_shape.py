@@ -147,3 +147,16 @@ def test_a_stretch_is_what_random_strains_do() -> None:
     half = np.array([0, 0, 0, 0, 0.5, 0, 0, 0.5, 0, 0.5])
     covariance = jacobian @ ShapeError(stretch=0.01).covariance(BODY) @ jacobian.T
     assert half @ covariance @ half == pytest.approx(np.var(size), rel=0.03)
+
+
+def test_a_grasp_that_may_be_far_off_moves_the_body_as_drawn_turns_do() -> None:
+    """In second order, too: along the arm that turns the centre stays behind, and by first order alone it would not."""
+    body = InertialParameters.from_com(0.6, [0.0, 0.2, 0.0], np.diag([1e-3, 2e-4, 1e-3]))
+    error, rad = ShapeError(com_m=0.0, inertia_share=0.0, grasp_rad=0.3), 0.3
+    draws = rad * np.random.default_rng(0).normal(size=600)
+    moved = np.zeros((10, 10))
+    for axis in np.eye(3):
+        off = np.stack([body.in_frame(Pose(Rotation.exp(u * axis), np.zeros(3))).vector for u in draws]) - body.vector
+        moved += off.T @ off / len(off)
+    found = np.diag(error.with_grasp(body))
+    np.testing.assert_allclose(found[1:4], np.diag(moved)[1:4], rtol=0.25, atol=1e-8)
