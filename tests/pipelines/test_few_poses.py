@@ -36,6 +36,7 @@ def test_perfect_poses_are_explained(poses: int, bias: str) -> None:
     for seed in range(4):
         estimate = sy.identify(weighed(poses, seed), options=sy.Options(bias=bias))  # type: ignore[arg-type]
         assert "wrench-unexplained" not in estimate.codes()
+        assert not any("no stream measures" in note for note in estimate.notes)
         assert 0.8 < (estimate.evidence.chi2_per_dof or 0) < 1.2
 
 
