@@ -89,7 +89,7 @@ def _little_borne(body: BodyRows, D: Array) -> tuple[Mask, ...] | None:
 def _missing(body: BodyRows, little: Sequence[Mask], fit: Weighing) -> float:
     """Return how much less [N] robots bear in these rows than in the others, beside what the payload needs."""
     needed = motion_map(fit.payload.parameters)[3:].T
-    less = np.concatenate([_borne(run, fit.D) - _along_weight(run.motion @ needed, run) for run in body.runs])
+    less = np.concatenate([_borne(run, fit.given) - _along_weight(run.motion @ needed, run) for run in body.runs])
     rows = np.concatenate(little)
     return float(np.median(less[~rows]) - np.median(less[rows]))
 
@@ -108,12 +108,8 @@ def untouched(
 ) -> tuple[Weighing, tuple[Finding, ...]]:
     """Return the fit of rows without those in which something touched the payload, and what is said of that.
 
-    Where forces are misread nothing is asked, and nothing is left out that the parameters hang on.
-
-    size  of the team [m]
+    Nothing is left out that the parameters hang on. size  of the team [m]
     """
-    if fit.read:
-        return fit, ()
     rows, touched = _without_touched(rows, fit, size, highest_hz)
     if not touched:
         return fit, ()
@@ -129,7 +125,7 @@ def _without_touched(
 ) -> tuple[PayloadRows, list[Finding]]:
     """Return recordings without rows in which the payload was touched, and for how long and how hard that was."""
     phi = fit.payload.parameters
-    pushes = [[] if body.still else [_unneeded(run, phi, fit.D, size) for run in body.runs] for body, _ in rows]
+    pushes = [[] if body.still else [_unneeded(run, phi, fit.given, size) for run in body.runs] for body, _ in rows]
     sizes = [np.linalg.norm(np.concatenate(each), axis=1) if each else np.zeros(0) for each in pushes]
     usual = [float(np.median(each)) if len(each) else np.inf for each in sizes]
     out, found = list(rows), list[Finding]()
@@ -148,8 +144,8 @@ def _without_touched(
         out[k] = (body.without(touched, highest_hz), left)
         newtons = max(float(np.linalg.norm(push[:, 3:], axis=1).max()) for push in pushes[k])
         text = (
-            f"For {body.seconds(touched):.1f} s of '{body.name}' robots push up to {newtons:.2g} N that the payload does "
-            "not need, as where a hand pushes it; its wrenches were left out meanwhile."
+            f"For {body.seconds(touched):.1f} s of '{body.name}' robots push up to {newtons:.2g} N that the payload "
+            "does not need, as where a hand pushes it; its wrenches were left out meanwhile."
         )
         found.append(Finding.of("contact", text))
     return out, found

@@ -77,16 +77,14 @@ class PayloadFit:
 
 @dataclass(frozen=True, eq=False)
 class Weighing:
-    """The payload of some rows, with the matrices that it was fitted with, and how forces were read.
+    """The payload of some rows, and how forces were read.
 
-    D, given  (6, 6 N) sum the pushes at B as they were read, and as rows have them     C  (6, 6) as of `fit_payload`
-    read      why they were read so     taken  by robot, as of `misread.taken.maps_of`
+    given  (6, 6 N) sums the pushes at B as rows have them, which groups have as they were read
+    read   why they were read so     taken  by robot, what (6, 6) makes of a wrench what it was taken for
     """
 
     groups: tuple[Group, ...]
-    D: Array
     given: Array
-    C: Array
     read: tuple[Finding, ...]
     taken: Mapping[str, Array]
     payload: PayloadFit
