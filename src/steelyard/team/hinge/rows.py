@@ -7,7 +7,7 @@ that H' is H turned by the hinge's angle q. About H:
 Mass on the line of the hinge turns with both bodies alike: its mass, first and second moment along the line can be
 moved from one body to the other and no wrench changes. Three of the twenty parameters are so beyond any motion, and the
 seventeen others are: ten of the whole with the hinge at zero, seven of the second body.
-Whether forces have the sign that they should is told as in `misread.signs`: what robots push against one another
+Whether forces have the sign that they should is told as in `misread.forces`: what robots push against one another
 through the hinge cancels in the sum of forces too. Beside the first body's motion, that of the second, turned by the
 hinge's angle, is taken out of every force, and so is a bias that turns.
 Source: Atkeson, An, Hollerbach 1986 for L; Ayusawa, Venture, Nakamura 2014 for what floating trees of bodies show.

@@ -4,6 +4,7 @@ Read rightly, what robots push against one another cancels, and what is left car
 every reading is tried on sums of products that are there already: a factor times a signed permutation X of its axes
 changes the sum of forces by R (X - 1) f. What a mass and a first moment that move as the grasps do leave of the sum
 must fall with biases left out of it, and with forces taken to be free of bias: either alone misses what the other sees.
+Where gains are wrong besides, or two robots leave a tie, a sign is told by what adds up and would cancel if turned.
 """
 
 from __future__ import annotations
@@ -112,7 +113,8 @@ def with_one_reading(
     kinds = [scatter([group]) for group in groups]
     fits &= _beside_others(kinds, D, robot, READINGS[number]) < RISES
     if not fits or len(equal) > 1:
-        turned = _of_other_sign(groups, D, given)
+        signs = not fits or any(k == SIGN for _, k in equal)
+        turned = _of_other_sign(groups, D, given) if signs else None
         if turned is None:
             return groups, (_undecided(equal, names),) if fits else _odd_one(groups, D, names, both), None
         robot, number = turned, SIGN
