@@ -91,6 +91,14 @@ def test_a_leap_of_one_of_two_is_put_right() -> None:
     assert "'robot1' are 100." in said
 
 
+def test_a_leap_is_put_right_where_the_caller_says_whose_grasp_slipped() -> None:
+    made = trial(robots=2)
+    log = jumped(made.log, "robot1", "motion", 0.2)
+    by_wrenches, said = (JointTeam(slipped=slipped).identify(log) for slipped in (None, ()))
+    assert "clock-unsteady" in said.codes()
+    assert said.findings == by_wrenches.findings
+
+
 @pytest.mark.parametrize("case", ["A", "B", "C", "D"])
 def test_sound_clocks_fast_ones_and_lost_rows_are_no_leap(case: str) -> None:
     for seed in range(50, 56):

@@ -190,6 +190,18 @@ def test_a_large_noisy_team_is_judged_robot_by_robot(monkeypatch: pytest.MonkeyP
     assert set(tried) == {way.words for way in misread_poses.TURNS}
 
 
+@pytest.mark.parametrize(("seed", "seconds"), [(100, 0.9), (101, 0.4)])
+def test_a_misreading_is_named_where_clocks_are_far_apart(seed: int, seconds: float) -> None:
+    """No fit of such poses brings clocks together; how fast grasps turn does."""
+    log = spoiled(made(3, seed), "robot1", scaled(1e3))
+    late = [
+        replace(r, tracks={n: t.stamped(t.time + seconds * (n == "robot2")) for n, t in r.tracks.items()})
+        for r in log.recordings
+    ]
+    with pytest.raises(BadValue, match=r"if those of 'robot1' are misread \(.*1000 times too large"):
+        JointTeam().identify(log.with_recordings(*late))
+
+
 def test_a_misreading_is_named_beside_a_robot_that_lets_go() -> None:
     """Rows in which it holds nothing fit no reading; what fits without them may be called robots that let go."""
     log = made(5, kinds=("motion",), motion_samples=2500, presence=(Presence(3, leaves=12.0),))

@@ -56,6 +56,7 @@ def test_a_sign_of_forces_or_torques_alone_is_put_right(robots: int, wrong: str)
         assert f"the sign of its {wrong}s was turned" in said.message
         assert f"the {wrong} columns of '{name}'" in said.remedy
         np.testing.assert_allclose(found.parameters.vector, right.parameters.vector, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(found.std, right.std, rtol=1e-4)
     assert "wrench-sign-flipped" not in right.codes()
 
 

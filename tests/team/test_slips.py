@@ -63,7 +63,7 @@ def test_a_slip_is_found_where_it_is() -> None:
 
 
 def test_wrenches_near_the_time_of_a_slip_are_left_out_of_its_own_recording_alone() -> None:
-    slip = Slip(2, 1, 7.0, np.array([0.0, 0.0, 0.0, 0.003, 0.0, 0.004]), 1.0, told=True)
+    slip = Slip(2, 1, 7.0, np.array([0.0, 0.0, 0.0, 0.003, 0.0, 0.004]), 1.0)
     before, during, after = slip.applied((held("one"), held("two"), held("three")))
     assert before.seen.all()
     assert before.felt.all()

@@ -67,6 +67,19 @@ def test_what_is_usual_is_told_by_other_recordings_where_a_hand_pushes_most_of_o
     assert worst(found, trial) < 4
 
 
+def test_a_hand_is_found_beside_forces_that_are_misread() -> None:
+    trial = simulate_team(replace(case("C"), motion_samples=3000), 4)
+    log = pushed(trial, len(trial.log.recordings) - 1, (6.0, 17.0), 2.0, PUSH)
+    mixed = []
+    for recording in log.recordings:
+        track = recording.tracks["robot1"]
+        channels = {**track.channels, "force": track.channels["force"][:, [1, 0, 2]]}
+        mixed.append(replace(recording, tracks={**recording.tracks, "robot1": replace(track, channels=channels)}))
+    found, right = (JointTeam().identify(one) for one in (log.with_recordings(*mixed), log))
+    assert found.codes() == {"contact", "force-unit"}
+    np.testing.assert_allclose(found.std, right.std, rtol=1e-4)
+
+
 def test_what_is_needed_of_one_recording_is_not_left_out() -> None:
     trial = simulate_team(TeamScene(CASES["C"], kinds=("still", "motion"), motion_samples=1500), 5)
     starts = tuple(np.arange(0.2, 14.5, 1.2))

@@ -79,6 +79,16 @@ def test_a_clock_that_runs_fast_is_named_and_put_right(sensing: str) -> None:
     assert bars_off(found, made) < 1.5 * bars_off(JointTeam().identify(made.log), made)
 
 
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+def test_a_clock_that_runs_fast_about_the_middle_of_the_only_recording_is_named(sensing: str) -> None:
+    """On average it is as late as the fit says, so that its rate alone tells."""
+    made = trial(sensing, 101, kinds=("motion",), motion_samples=2500)
+    found = JointTeam().identify(restamped(made.log, "motion", lambda t: t + 3e-4 * (t - t.mean()), "robot1"))
+    (said,) = (finding.message for finding in found.findings if finding.code == "clock-unsteady")
+    assert "'robot1' run " in said
+    assert float(said.split(" run ")[1].split(" ")[0]) == pytest.approx(300, abs=15)
+
+
 def test_a_reference_that_is_set_anew_shows_in_all_others() -> None:
     made = trial("joints")
     found = JointTeam().identify(restamped(made.log, "motion", lambda t: t + LATE, "robot0"))

@@ -51,7 +51,6 @@ class JointTeam:
     highest_hz  of what motion and wrench are compared at; above, a payload carried by robots hardly moves
     slipped     with two robots: which slips, the clearest first, are those of the robot that shows them less; None =
                 what the wrenches say
-    jumped      what stamps were put right by where clocks jump; looked for where `slipped` is None
     """
 
     clocks: bool = True
@@ -59,7 +58,6 @@ class JointTeam:
     wrists: Mapping[str, float] = field(default_factory=dict)
     highest_hz: float = 4.0
     slipped: tuple[bool, ...] | None = None
-    jumped: ClockErrors = NOTHING
 
     def __post_init__(self) -> None:
         check.positive("highest_hz", self.highest_hz)
@@ -69,15 +67,19 @@ class JointTeam:
         require_wrenches(log)
         self._require_wrists(log)
         log = log.while_holding()
+        log, jumped = cut_at_jumps(log, drifts=True) if self.clocks else (log, NOTHING)
         if self.slipped is None:
-            log, jumped = cut_at_jumps(log, drifts=True) if self.clocks else (log, NOTHING)
-            return whose_slip(log, lambda slipped: replace(self, slipped=slipped, jumped=jumped).identify(log))
-        seen = self._from_twists(log) if needs_twists(log) else self._from_poses(log)
+            return whose_slip(log, lambda slipped: self._answer(log, jumped, slipped))
+        return self._answer(log, jumped, self.slipped)
+
+    def _answer(self, log: TeamLog, jumped: ClockErrors, slipped: Sequence[bool]) -> TeamEstimate:
+        """Return the answer with stamps put right by `jumped`, and slips taken for the robots' that `slipped` says."""
+        seen = (self._from_twists if needs_twists(log) else self._from_poses)(log, jumped, slipped)
         return seen if isinstance(seen, TeamEstimate) else weighed(seen, self.wrists, self.gains, self.highest_hz)
 
-    def _from_twists(self, log: TeamLog) -> Seen:
+    def _from_twists(self, log: TeamLog, jumped: ClockErrors, slipped: Sequence[bool]) -> Seen:
         """Return what twists show; raises CannotAnswer where two bodies with a hinge move on bases that move."""
-        log, moving, begun = self._fitted(log, partial(TwistTeam.of, other=self.slipped or ()))
+        log, moving, begun = self._fitted(log, partial(TwistTeam.of, other=slipped), jumped)
         turning = TurningGains.of(moving.parts, moving.fit.grasps, moving.fit.noise)
         tilt, differ = moving.tilt(log.names), tuple(turning.findings(log.names))
         if differ or _doubtful(moving, tilt):
@@ -94,14 +96,14 @@ class JointTeam:
         made, path = moving.rows(self.highest_hz)
         return Seen(log, moving, spread, begun, tuple(found), made, path, moving.down())
 
-    def _from_poses(self, log: TeamLog) -> Seen | TeamEstimate:
+    def _from_poses(self, log: TeamLog, jumped: ClockErrors, slipped: Sequence[bool]) -> Seen | TeamEstimate:
         """Return what poses show, or the answer itself where the payload is two bodies with a hinge.
 
         Raises BadValue where one robot's poses are misread.
         """
-        of = partial(PoseTeam.of, other=self.slipped or ())
+        of = partial(PoseTeam.of, other=slipped)
         try:
-            log, standing, begun = self._fitted(log, of)
+            log, standing, begun = self._fitted(log, of, jumped)
         except check.FAILURES:
             require_well_read(log)
             raise
@@ -125,12 +127,14 @@ class JointTeam:
         made, path = standing.rows(log, self.highest_hz)
         return Seen(log, standing, spread, begun, tuple(found), made, path, standing.down(log), yields)
 
-    def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, ClockErrors]:
+    def _fitted(
+        self, log: TeamLog, of: Callable[[TeamLog, bool], F], jumped: ClockErrors
+    ) -> tuple[TeamLog, F, ClockErrors]:
         """Return log, fit, and how late clocks are beside what the fit says: begun anew where robots disagree."""
         team, begun = of(log, self.clocks), NOTHING
         if self.clocks and team.rough:
             log, team, begun = searched(log, team, lambda moved: of(moved, True))
-        begun = self.jumped + begun
+        begun = jumped + begun
         if team.rough:
             return log, team, begun
         return steadied(log, team, lambda moved: of(moved, True), begun)

@@ -124,7 +124,8 @@ class MotionFit(ABC):
 
     def measured(self, log: TeamLog, found: Slip) -> Slip:
         """Return a slip with time and step by this fit, which was made without what follows it."""
-        if found.between and found.told:
+        # Between recordings of twists, fits to what is before and after have told it.
+        if found.between and self.drifts:
             return found
         every = self._left_of_all(log)
         if found.between:

@@ -85,7 +85,7 @@ def longest_run(rows: Integers, bridged: int) -> Integers:
     return max(np.split(rows, np.flatnonzero(np.diff(rows) > bridged + 1) + 1), key=len)
 
 
-def unexplained(first: Array, second: Array, noise: Array) -> float:
+def share_left(first: Array, second: Array, noise: Array) -> float:
     """Return the share of the power of `second` (T, 6) that no fixed linear map of `first` (T, 6) explains.
 
     What is left below LOUD times the noise (2,) of turning and of moving counts as none.
@@ -102,12 +102,12 @@ def bodies(twist: Array, noise: Array) -> list[tuple[int, ...]]:
     """Return the groups of robots, by number, that move as one body each.
 
     twist  (T, N, 6) of every robot in axes of its own, angular part first [rad/s, m/s]
-    noise  (N, 2) of turning and of moving, as `unexplained` takes it
+    noise  (N, 2) of turning and of moving, as `share_left` takes it
     """
     groups: list[list[int]] = []
     for i in range(twist.shape[1]):
         for group in groups:
-            if unexplained(twist[:, group[0]], twist[:, i], noise[group[0]] + noise[i]) < RIGID:
+            if share_left(twist[:, group[0]], twist[:, i], noise[group[0]] + noise[i]) < RIGID:
                 group.append(i)
                 break
         else:

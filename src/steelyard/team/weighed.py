@@ -19,9 +19,8 @@ from steelyard.team.clocks.errors import ClockErrors, Errors
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.misread.files import require_metres
-from steelyard.team.misread.forces import with_one_reading
-from steelyard.team.misread.readings import maps_of
-from steelyard.team.misread.signs import sign_finding, torque_sign_finding, with_one_sign, with_torque_sign
+from steelyard.team.misread.forces import reread, with_one_reading
+from steelyard.team.misread.signs import TORQUES_TURNED, sign_finding, torque_sign_finding, torques_of_other_sign
 from steelyard.team.motion_fit import MotionFit, against
 from steelyard.team.payload.body_rows import PayloadRows, balance_frame, require_balance, require_runs, summing
 from steelyard.team.payload.doubt import weight_by_gains
@@ -89,6 +88,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     log, motion, grasps, spread = seen.log, seen.motion, seen.motion.fit.grasps, seen.spread
     require_metres(log.names, grasps)
     placed = balance_frame(grasps).inverse() @ grasps
+    D = summing(placed)
     require_balance(log, [body for body, _ in seen.rows], placed)
     size = team_size(grasps, spread)
     known = spread.turn(size) < COMPARABLE
@@ -97,16 +97,16 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     def fitted(rows: PayloadRows) -> Weighing:
         groups = _groups(rows, seen.path, highest_hz, motion.ORDER)
         groups = tuple(replace(group, sighted=known) for group in groups)
-        groups, D, read, taken = _with_forces_read(groups, summing(placed), log.names, known)
-        C = unit_bias(D, six_axis, size)
-        given = _summing_given(summing(placed), log.names, taken)
-        return Weighing(groups, D, given, C, tuple(read), taken, fit_payload(groups, D, C, size, with_gain))
+        groups, read, taken = _with_forces_read(groups, D, log.names) if known else (groups, (), {})
+        given = _summing_given(D, log.names, taken)
+        return Weighing(groups, given, read, taken, fit_payload(groups, D, C, size, with_gain))
 
-    standing, propped = unpropped(seen.rows, fitted, summing(placed), highest_hz)
+    C = unit_bias(D, six_axis, size)
+    standing, propped = unpropped(seen.rows, fitted, D, highest_hz)
     rows, begun, late = with_timely_forces(standing, fitted(standing), fitted, highest_hz)
-    rows, alike, loaded = with_one_load(rows, begun, fitted, summing(placed), size, highest_hz)
+    rows, alike, loaded = with_one_load(rows, begun, fitted, D, size, highest_hz)
     first, touched = untouched(rows, alike, fitted, size, highest_hz)
-    groups, D, C, read, payload = first.groups, first.D, first.C, first.read, first.payload
+    groups, read, payload = first.groups, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
     _require_one_clock(payload.chi2)
@@ -121,7 +121,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         payload = replace(payload, covariance=payload.covariance + late.unsure(payload, D))
     if seen.yields is not None:
         # Of all sensors only the sum of their biases is known: it may be that of any one.
-        borne = np.linalg.solve(summing(placed).reshape(6, -1, 6).swapaxes(0, 1), payload.biases.T)
+        borne = np.linalg.solve(D.reshape(6, -1, 6).swapaxes(0, 1), payload.biases.T)
         each = np.asarray(borne, np.float64)
         spread = seen.yields.biased(spread, grasps, log.names.index(log.reference), each.transpose(2, 0, 1))
     team = _without_wrists(
@@ -151,28 +151,25 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
 
 
 def _with_forces_read(
-    groups: tuple[Group, ...], D: Array, names: Sequence[str], known: bool
-) -> tuple[tuple[Group, ...], Array, list[Finding], Mapping[str, Array]]:
-    """Return groups and D (6, 6 N) with one robot's forces read as they fit the others', why, and as what (6, 6).
+    groups: tuple[Group, ...], D: Array, names: Sequence[str]
+) -> tuple[tuple[Group, ...], tuple[Finding, ...], Mapping[str, Array]]:
+    """Return groups with wrenches read as they fit the others', why, and by robot as what (6, 6).
 
-    known  whether grasps' rotations are: forces along axes that nobody knows are not compared
+    D  (6, 6 N) sums the pushes at B
     """
-    given, reading = D, None
-    if known:
-        groups, read, doubtful, reading = with_one_reading(groups, D, names)
-    else:
-        read, doubtful = (), np.zeros(len(names), np.bool_)
-    D, signs = with_one_sign(groups, D, names, doubtful)
-    found = [*(one for one in read if not (signs and one.code == "wrench-unexplained")), *signs]
-    odd, D = with_torque_sign(groups, D) if known else (None, D)
+    groups, found, reading = with_one_reading(groups, D, names)
+    taken = {} if reading is None else {names[reading[0]]: reading[1]}
+    odd = torques_of_other_sign(groups, D)
     if odd is not None:
-        whole = sign_finding(names[odd])
-        found = [*(one for one in found if one != whole), torque_sign_finding(names[odd], whole in found)]
-    return groups, D, found, maps_of(names, given, D, reading)
+        name, whole = names[odd], sign_finding(names[odd])
+        groups = reread(groups, odd, TORQUES_TURNED)
+        taken[name] = TORQUES_TURNED @ taken.get(name, np.eye(6))
+        found = (*(one for one in found if one != whole), torque_sign_finding(name, whole in found))
+    return groups, found, taken
 
 
 def _summing_given(D: Array, names: Sequence[str], taken: Mapping[str, Array]) -> Array:
-    """Return D (6, 6 N) for pushes as given, some of which were taken for others (`maps_of`)."""
+    """Return D (6, 6 N) for pushes as given, some of which were taken for others (6, 6)."""
     maps = [taken.get(name, np.eye(6)) for name in names]
     return np.concatenate([block @ M for block, M in zip(np.split(D, len(names), axis=1), maps, strict=True)], axis=1)
 

@@ -39,8 +39,6 @@ TIMES, SHARE = 8.0, 0.03
 # Where more of a recording is touched, it is left out if there are others. What is usual in it is at most so many times
 # what it is in another.
 MOST, UNLIKE = 0.4, 2.0
-# Times that touches are looked for, each in what the last fit leaves.
-TOUCHES = 3
 # A recording is odd that leaves so many times what others do (rms), and SHARE of the weight; it is looked into where it
 # already leaves SUSPECT times what the middle one does, with all in the fit.
 ODD, SUSPECT = 8.0, 3.0
@@ -91,7 +89,7 @@ def _little_borne(body: BodyRows, D: Array) -> tuple[Mask, ...] | None:
 def _missing(body: BodyRows, little: Sequence[Mask], fit: Weighing) -> float:
     """Return how much less [N] robots bear in these rows than in the others, beside what the payload needs."""
     needed = motion_map(fit.payload.parameters)[3:].T
-    less = np.concatenate([_borne(run, fit.D) - _along_weight(run.motion @ needed, run) for run in body.runs])
+    less = np.concatenate([_borne(run, fit.given) - _along_weight(run.motion @ needed, run) for run in body.runs])
     rows = np.concatenate(little)
     return float(np.median(less[~rows]) - np.median(less[rows]))
 
@@ -110,45 +108,27 @@ def untouched(
 ) -> tuple[Weighing, tuple[Finding, ...]]:
     """Return the fit of rows without those in which something touched the payload, and what is said of that.
 
-    Touches that bend the first fit are seen better by the next. Where forces are misread nothing is asked, and nothing
-    is left out that the parameters hang on. size  of the team [m]
+    Nothing is left out that the parameters hang on. size  of the team [m]
     """
-    touched = dict[str, tuple[float, float]]()
-    for _ in range(TOUCHES):
-        if fit.read:
-            break
-        rows, found = _without_touched(rows, fit, size, highest_hz)
-        if not found:
-            break
-        try:
-            fewer = fitted(rows)
-        except CannotAnswer:
-            break
-        if fewer.payload.lost.shape[1] > fit.payload.lost.shape[1]:
-            break
-        fit = fewer
-        for name, seconds, newtons in found:
-            before = touched.get(name, (0.0, 0.0))
-            touched[name] = before[0] + seconds, max(before[1], newtons)
-    return fit, tuple(
-        Finding.of(
-            "contact",
-            f"For {seconds:.1f} s of '{name}' robots push up to {newtons:.2g} N that the payload does not need, as "
-            "where a hand pushes it; its wrenches were left out meanwhile.",
-        )
-        for name, (seconds, newtons) in touched.items()
-    )
+    rows, touched = _without_touched(rows, fit, size, highest_hz)
+    if not touched:
+        return fit, ()
+    try:
+        fewer = fitted(rows)
+    except CannotAnswer:
+        return fit, ()
+    return (fit, ()) if fewer.payload.lost.shape[1] > fit.payload.lost.shape[1] else (fewer, tuple(touched))
 
 
 def _without_touched(
     rows: PayloadRows, fit: Weighing, size: float, highest_hz: float
-) -> tuple[PayloadRows, list[tuple[str, float, float]]]:
-    """Return recordings without rows in which the payload was touched: which, how long [s], how hard at most [N]."""
+) -> tuple[PayloadRows, list[Finding]]:
+    """Return recordings without rows in which the payload was touched, and for how long and how hard that was."""
     phi = fit.payload.parameters
-    pushes = [[] if body.still else [_unneeded(run, phi, fit.D, size) for run in body.runs] for body, _ in rows]
+    pushes = [[] if body.still else [_unneeded(run, phi, fit.given, size) for run in body.runs] for body, _ in rows]
     sizes = [np.linalg.norm(np.concatenate(each), axis=1) if each else np.zeros(0) for each in pushes]
     usual = [float(np.median(each)) if len(each) else np.inf for each in sizes]
-    out, found = list(rows), list[tuple[str, float, float]]()
+    out, found = list(rows), list[Finding]()
     for k, (body, left) in enumerate(rows):
         if not pushes[k]:
             continue
@@ -163,7 +143,11 @@ def _without_touched(
             touched = [np.ones_like(some) for some in touched]
         out[k] = (body.without(touched, highest_hz), left)
         newtons = max(float(np.linalg.norm(push[:, 3:], axis=1).max()) for push in pushes[k])
-        found.append((body.name, body.seconds(touched), newtons))
+        text = (
+            f"For {body.seconds(touched):.1f} s of '{body.name}' robots push up to {newtons:.2g} N that the payload "
+            "does not need, as where a hand pushes it; its wrenches were left out meanwhile."
+        )
+        found.append(Finding.of("contact", text))
     return out, found
 
 

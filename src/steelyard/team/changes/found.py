@@ -103,20 +103,16 @@ def _without_slips(
         if any(other[len(slips) : len(slips) + 1]):
             found = replace(found, robot=1 - found.robot)
         # Once more without what follows the slip, which has bent the first fit.
-        before, again = team, edited(edit, [*slips, found])
+        before = team
         try:
-            team = fitted(again)
+            team = fitted(edited(edit, [*slips, found]))
         except FAILURES:
             break
-        # Recordings that differ for another reason than a slip still do.
+        # Recordings that differ for another reason than a slip, as a hinge, still do.
         fallen = float(np.log(before.fit.noise / team.fit.noise).mean())
         if before.rough and team.rough and found.between and fallen < np.log(BETTER):
             break
-        measured = team.measured(log, found.beside(slips))
-        # What bends the first fit looks larger in it.
-        if not measured.large:
-            break
-        slips.append(measured)
+        slips.append(team.measured(log, found.beside(slips)))
     if not slips:
         return replace(given, clocks_left=left)
     team = fitted(edited(edit, slips))

@@ -68,7 +68,7 @@ def with_one_load(
             continue
         _, later, rows, fit = max(parts, key=lambda part: part[0])
         for _, other, tried, again in parts:
-            if BETTER * _disagree(again, size) < _disagree(fit, size):
+            if BETTER * _disagree(again, D, size) < _disagree(fit, D, size):
                 later, rows, fit = other, tried, again
         found.append(_finding(body, step, later))
     return rows, fit, tuple(found)
@@ -143,10 +143,10 @@ def _gone(run: Run, at: float, later: bool) -> Mask:
     return np.asarray(time < at + MARGIN_S if later else time > at - MARGIN_S)
 
 
-def _disagree(fit: Weighing, size: float) -> float:
+def _disagree(fit: Weighing, D: Array, size: float) -> float:
     """Return by how much [N] recordings disagree on the payload: the rms of what each leaves on average."""
     parts = [part for group in fit.groups for part in group.parts]
-    return float(np.sqrt((mean_left(fit.payload.parameters, parts, fit.D, size) ** 2).mean()))
+    return float(np.sqrt((mean_left(fit.payload.parameters, parts, D, size) ** 2).mean()))
 
 
 def _finding(body: BodyRows, step: LoadStep, later: bool) -> Finding:

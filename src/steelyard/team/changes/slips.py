@@ -36,7 +36,6 @@ class Slip:
     """A slip of robot `robot` in one recording at `time` [s].
 
     step   (6,) rotation vector and position of the grasp after it, in its own axes
-    told   whether the step is known by a fit without what follows it; else the rows after it are left out of everything
     A time of -inf is before the recording, and after recording `since`; that is the one before unless it is given. It
     is timed before `until` [s].
     """
@@ -46,7 +45,6 @@ class Slip:
     time: float
     step: Array
     score: float
-    told: bool = False
     since: int | None = None
     until: float = np.inf
 
@@ -78,7 +76,7 @@ class Slip:
         middle = part.time[row]
         after, before = seen & (part.time > middle + GAP_S), seen & (part.time < middle - GAP_S)
         full = step[row] if drifts else apart[after].mean(0) - apart[before].mean(0)
-        return replace(self, time=float(middle), step=full, score=float(score[row]), told=True)
+        return replace(self, time=float(middle), step=full, score=float(score[row]))
 
     def beside(self, slips: Sequence[Slip]) -> Slip:
         """Return the slip, to be timed before others of its robot in its recording: they are clear, and known."""
@@ -97,13 +95,10 @@ class Slip:
             seen, felt, wrench = part.seen.copy(), part.felt.copy(), part.wrench.copy()
             seen[after | near, robot] = False
             felt[near, robot] = False
-            if not self.told:
-                felt[after, robot] = False
-            else:
-                turn = Rotation.exp(self.step[:3])
-                force, moment = (turn.apply(wrench[after, robot, k : k + 3]) for k in (3, 0))
-                wrench[after, robot, 3:] = force
-                wrench[after, robot, :3] = moment + np.cross(self.step[3:], force)
+            turn = Rotation.exp(self.step[:3])
+            force, moment = (turn.apply(wrench[after, robot, k : k + 3]) for k in (3, 0))
+            wrench[after, robot, 3:] = force
+            wrench[after, robot, :3] = moment + np.cross(self.step[3:], force)
             out[number] = replace(part, seen=seen, felt=felt, wrench=wrench)
         return tuple(out)
 

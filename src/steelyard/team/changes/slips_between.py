@@ -54,7 +54,7 @@ def step_between(found: Slip, parts: Sequence[Stretch], apart: Sequence[Array]) 
     """Return the slip with its step from the residuals (T, N, 6) of every recording of a fit to what was before it."""
     means, recording = _windows(parts, apart, found.robot)
     after = recording >= found.recording
-    return replace(found, step=means[after].mean(0) - means[~after].mean(0), told=True)
+    return replace(found, step=means[after].mean(0) - means[~after].mean(0))
 
 
 def as_large_as_slips(slip: Slip) -> bool:
@@ -130,5 +130,5 @@ def _step_of_fits(before: TwistFit, after: TwistFit, reference: int, chance: flo
     steps = np.linalg.solve(information, pull[..., None])[..., 0]
     scores = (steps * pull).sum(1)
     robot = int(np.argmax(scores))
-    slip = Slip(robot, 0, -np.inf, steps[robot], float(scores[robot]), told=True)
+    slip = Slip(robot, 0, -np.inf, steps[robot], float(scores[robot]))
     return slip if as_large_as_slips(slip) and slip.score >= 2 * gammainccinv(3.0, chance) else None

@@ -25,8 +25,7 @@ from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.payload.model import LEAST_MASS, SHOWN, Normal, least_noise, units_of_body
 from steelyard.team.split import hinge_words
 
-# The first of twelve is that of `_start`.
-FEWEST, ROUNDS = 2, 11
+# Noise has settled where it changes by less than this share.
 SETTLED = 0.01
 
 
@@ -112,7 +111,7 @@ def fit_hinged_payload(
     equations = _Equations(sums, V)
     phi, kinds = _start(kinds, equations, C, ladder, size)
     scale = _units(max(abs(float(phi[0])), LEAST_MASS), size)
-    found = settled(kinds, phi, equations, C, ladder, scale, FEWEST, ROUNDS, SETTLED)
+    found = settled(kinds, phi, equations, C, ladder, scale, SETTLED)
     phi, models, kinds = found.phi, found.models, found.groups
     shown = models.shown(scale)
     rows = 7 * sum(float(p.rows.sum()) for k in kinds for p in k.parts)

@@ -7,7 +7,7 @@ that H' is H turned by the hinge's angle q. About H:
 Mass on the line of the hinge turns with both bodies alike: its mass, first and second moment along the line can be
 moved from one body to the other and no wrench changes. Three of the twenty parameters are so beyond any motion, and the
 seventeen others are: ten of the whole with the hinge at zero, seven of the second body.
-Whether forces have the sign that they should is told as in `misread.signs`: what robots push against one another
+Whether forces have the sign that they should is told as in `misread.forces`: what robots push against one another
 through the hinge cancels in the sum of forces too. Beside the first body's motion, that of the second, turned by the
 hinge's angle, is taken out of every force, and so is a bias that turns.
 Source: Atkeson, An, Hollerbach 1986 for L; Ayusawa, Venture, Nakamura 2014 for what floating trees of bodies show.
@@ -25,7 +25,7 @@ from steelyard.findings import Finding
 from steelyard.inertia.regressor import basis
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.hinge.poses import Hinged
-from steelyard.team.misread.signs import odd_one_out
+from steelyard.team.misread.signs import sign_finding
 from steelyard.team.payload.body_rows import BodyRows, Run, from_poses, summing
 from steelyard.team.payload.spectra import as_frequencies, bands, frequencies
 from steelyard.team.stacked import Stretch
@@ -43,6 +43,8 @@ EXCHANGED[0, 0] = EXCHANGED[3, 1] = EXCHANGED[4, 2] = EXCHANGED[7, 2] = 1.0
 # Columns before the robots' forces: motion of the first body, of the second, that turned, means and means turned.
 MOTION = 12
 INNER = 4 * MOTION + 3
+# What the motion leaves of the sum of forces must have so many times the variance that it has with the other sign.
+FALLS = 4.0
 
 
 def hinge_frame(team: Hinged) -> Pose:
@@ -176,6 +178,7 @@ def robot_of_other_sign(
 ) -> tuple[int | None, tuple[Finding, ...]]:
     """Return the robot whose sign must be turned, None where all are right, and the finding that says so.
 
+    What robots push against one another cancels in the sum over the team; of one with the other sign it adds up.
     made  of every recording, where everything is and the rows of either body
     """
     count = len(names)
@@ -188,7 +191,13 @@ def robot_of_other_sign(
             left = S[INNER:, INNER:] - pushes @ np.linalg.pinv(inner, 1e-9, hermitian=True) @ pushes.T
             each += np.einsum("aiaj->ij", left.reshape(3, count, 3, count))
             lifted += np.einsum("aia->i", pushes[:, 3:6].reshape(3, count, 3))
-    return odd_one_out(each, lifted, names)
+    turned = each.sum() - 4 * (each.sum(1) - np.diag(each))
+    asking = np.flatnonzero(turned < each.sum() / FALLS)
+    if not len(asking):
+        return None, ()
+    # Of two robots each asks for it: it is the one that pulls down.
+    wrong = int(asking[np.argmin(lifted[asking])])
+    return wrong, (sign_finding(names[wrong]),)
 
 
 def _scatter(team: Hinged, one: BodyRows, two: BodyRows, sums: Sums, highest_hz: float) -> Array:

@@ -4,6 +4,7 @@ Read rightly, what robots push against one another cancels, and what is left car
 every reading is tried on sums of products that are there already: a factor times a signed permutation X of its axes
 changes the sum of forces by R (X - 1) f. What a mass and a first moment that move as the grasps do leave of the sum
 must fall with biases left out of it, and with forces taken to be free of bias: either alone misses what the other sees.
+Where gains are wrong besides, or two robots leave a tie, a sign is told by what adds up and would cancel if turned.
 """
 
 from __future__ import annotations
@@ -13,15 +14,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array
 from steelyard.findings import Finding, percent, quoted
 from steelyard.inertia.regressor import basis
 from steelyard.team.misread.readings import AXES, FACTORS, READINGS, SIGN, WrenchReading, torques_beside
 from steelyard.team.misread.signs import sign_finding
 from steelyard.team.payload.gain_sight import of_force
-from steelyard.team.payload.model import Group, centred, pseudoinverse, scatter, unexplained
+from steelyard.team.payload.model import Group, centred, left_of_pushes, pseudoinverse, scatter
 
-# Both variances that are left must together, on average, fall by this factor each.
+# Both variances that are left must together, on average, fall by this factor each; what any motion leaves of the sum
+# must where signs alone are asked for.
 FALLS = 4.0
 # What is left, biases and all, must be below this share of the variance of all forces: gains of 10 % leave less.
 MISSES = 0.01
@@ -81,16 +83,12 @@ class _Left:
         left = self.variance + 2 * self.slope @ none + self.curvature @ none @ none
         return np.asarray(left / max(self.variance, ROUNDING * float(self.size.sum())))
 
-    def by_sign(self) -> Mask:
-        """Return of which robots (N,) less is left with the sign turned."""
-        return np.asarray(self.shares()[0][:, SIGN] < 1.0)
-
 
 def with_one_reading(
     groups: Sequence[Group], D: Array, names: Sequence[str]
-) -> tuple[tuple[Group, ...], tuple[Finding, ...], Mask, tuple[int, Array] | None]:
-    """Return the groups with one robot's wrench read as it fits the others', why, whose signs (N,) may be wrong, and
-    whose wrench was mapped by what (6, 6), None where all were left.
+) -> tuple[tuple[Group, ...], tuple[Finding, ...], tuple[int, Array] | None]:
+    """Return the groups with one robot's wrench read as it fits the others', why, and whose wrench was mapped by what
+    (6, 6), None where all were left.
 
     D  (6, 6 N) sums the pushes at B
     """
@@ -99,7 +97,7 @@ def with_one_reading(
     given = _left(S, D)
     # Nothing fits better, and not much is left: so it is with most logs.
     if not np.maximum(*given.shares()).min() < 1.0 and given.misfit < UNFIT:
-        return groups, (), given.by_sign(), None
+        return groups, (), None
     both = (given, _left(_without_bias(groups), D))
     shares = [one.shares() for one in both]
     score = shares[0][1] * shares[1][1]
@@ -112,15 +110,32 @@ def with_one_reading(
     without = np.prod([one.left_out()[robot] for one in both])
     # A sensor that is merely loud is best left out, and every reading that makes it small seems right.
     fits &= CLEAR * left < without
-    if not fits or _unlike(groups, D, robot, READINGS[number]):
-        return groups, _odd_one(groups, D, names, both), given.by_sign(), None
-    if len(equal) > 1:
-        signs = given.by_sign() & any(k == SIGN for _, k in equal)
-        return groups, () if signs.any() else (_undecided(equal, names),), signs, None
+    kinds = [scatter([group]) for group in groups]
+    fits &= _beside_others(kinds, D, robot, READINGS[number]) < RISES
+    if not fits or len(equal) > 1:
+        signs = not fits or any(k == SIGN for _, k in equal)
+        turned = _of_other_sign(groups, D, given) if signs else None
+        if turned is None:
+            return groups, (_undecided(equal, names),) if fits else _odd_one(groups, D, names, both), None
+        robot, number = turned, SIGN
     reading = _with_torque(S, D, robot, number)
-    read = tuple(_reread(group, robot, reading.wrench()) for group in groups)
-    found = (_finding(names[robot], reading, score[robot, number]),)
-    return read, found, _left(scatter(read), D).by_sign(), (robot, reading.wrench())
+    read = reread(groups, robot, reading.wrench())
+    return read, (_finding(names[robot], reading, score[robot, number]),), (robot, reading.wrench())
+
+
+def reread(groups: Sequence[Group], robot: int, wrench: Array) -> tuple[Group, ...]:
+    """Return the groups with one robot's wrench mapped by (6, 6)."""
+    return tuple(_reread(group, robot, wrench) for group in groups)
+
+
+def _of_other_sign(groups: Sequence[Group], D: Array, given: _Left) -> int | None:
+    """Return the robot whose sign must be turned for forces to cancel beside one another, whatever else is wrong."""
+    each = [part.scatter.sum(0) for group in groups for part in group.parts]
+    asks = np.flatnonzero(given.shares()[0][:, SIGN] < 1.0)
+    asking = [int(i) for i in asks if _beside_others(each, D, int(i), READINGS[SIGN]) < 1 / FALLS]
+    # Of two robots each asks for it: it is the one that pulls down.
+    lifted = np.einsum("aix,ixa->i", D[3:].reshape(3, -1, 6), scatter(groups)[12:-1, 3:6].reshape(-1, 6, 3))
+    return min(asking, key=lambda robot: float(lifted[robot]), default=None)
 
 
 def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequence[_Left]) -> tuple[Finding, ...]:
@@ -128,7 +143,7 @@ def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequ
     if both[0].misfit < UNFIT:
         return ()
     found = _mapped(both)
-    if found is None or _unlike(groups, D, *found):
+    if found is None or _beside_others([scatter([group]) for group in groups], D, *found) > RISES:
         return ()
     robot, X = found
     # A map that is no turn may stand for a large bias, or for gravity that is wrong.
@@ -214,18 +229,15 @@ def _reread(group: Group, robot: int, wrench: Array) -> Group:
     return replace(group, parts=tuple(parts))
 
 
-def _unlike(groups: Sequence[Group], D: Array, robot: int, X: Array) -> bool:
-    """Return whether robots push more against one another with one's force mapped by X (3, 3) than as given.
+def _beside_others(each: Sequence[Array], D: Array, robot: int, X: Array) -> float:
+    """Return what any motion whatever leaves of the sum of forces with one's mapped by X (3, 3), over that as given.
 
-    What any motion whatever leaves of the sum of forces is judged, as for signs.
+    each  scatters with a motion and a bias of their own
     """
-    given, read = 0.0, 0.0
-    for group in groups:
-        S = scatter([group])
-        turned = _turned(S, robot, X)
-        a, b = (unexplained(D[3:], np.eye(12), one) for one in (S, turned))
-        given, read = given + a, read + b
-    return read > RISES * given
+    given, read = (
+        sum(left_of_pushes(D[3:], np.eye(12), S) for S in some) for some in (each, [_turned(S, robot, X) for S in each])
+    )
+    return read / max(given, 1e-300)
 
 
 def _with_torque(S: Array, D: Array, robot: int, number: int) -> WrenchReading:
@@ -238,7 +250,7 @@ def _with_torque(S: Array, D: Array, robot: int, number: int) -> WrenchReading:
     if number == SIGN:
         return WrenchReading(number, -given.torque)
     E = basis()[1:, :3]
-    left = [unexplained(D[:3], E, _turned(S, robot, one.wrench())) for one in (given, *others)]
+    left = [left_of_pushes(D[:3], E, _turned(S, robot, one.wrench())) for one in (given, *others)]
     best = int(np.argmin(left))
     return (given, *others)[best] if CLEAR * left[best] < left[0] else given
 

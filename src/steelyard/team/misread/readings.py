@@ -6,7 +6,7 @@ moment and force as given, in a robot's grasp, to what they are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,20 +93,6 @@ def torques_beside(number: int) -> tuple[WrenchReading, ...]:
     sizes = dict.fromkeys((1.0, float(_SIZES[number // len(AXES), 1])))
     turned = turned[: 1 if number % len(AXES) == 0 else None]
     return tuple(WrenchReading(number, size * X) for size in sizes for X in turned)
-
-
-def maps_of(names: Sequence[str], D: Array, taken: Array, reading: tuple[int, Array] | None) -> dict[str, Array]:
-    """Return the maps (6, 6), by robot, of those whose wrench was taken for another.
-
-    D        (6, 6 N) from moment and force of every robot to the sum, as grasps are
-    taken    (6, 6 N) the same with signs turned
-    reading  robot and map (6, 6) that went before
-    """
-    signs = np.where((D * taken).sum(0) < 0, -1.0, 1.0).reshape(-1, 6)
-    maps = {k: np.diag(s) for k, s in enumerate(signs)}
-    if reading is not None:
-        maps[reading[0]] = maps[reading[0]] @ reading[1]
-    return {names[k]: M for k, M in maps.items() if not np.array_equal(M, np.eye(6))}
 
 
 def as_taken(log: TeamLog, maps: Mapping[str, Array]) -> TeamLog:

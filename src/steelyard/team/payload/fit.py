@@ -32,7 +32,7 @@ from steelyard.team.payload.spectra import NO_LEVERS
 from steelyard.team.stacked import row_slices
 
 # With two robots, whose moment is balanced through the payload alone, it takes up to nine.
-FEWEST, ROUNDS = 1, 12
+ROUNDS = 12
 # Noise has settled where it changes by less than this share.
 SETTLED = 0.03
 
@@ -77,16 +77,14 @@ class PayloadFit:
 
 @dataclass(frozen=True, eq=False)
 class Weighing:
-    """The payload of some rows, with the matrices that it was fitted with, and how forces were read.
+    """The payload of some rows, and how forces were read.
 
-    D, given  (6, 6 N) sum the pushes at B as they were read, and as rows have them     C  (6, 6) as of `fit_payload`
-    read      why they were read so     taken  by robot, as of `misread.taken.maps_of`
+    given  (6, 6 N) sums the pushes at B as rows have them, which groups have as they were read
+    read   why they were read so     taken  by robot, what (6, 6) makes of a wrench what it was taken for
     """
 
     groups: tuple[Group, ...]
-    D: Array
     given: Array
-    C: Array
     read: tuple[Finding, ...]
     taken: Mapping[str, Array]
     payload: PayloadFit
@@ -103,7 +101,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     ladder = ladder_of(sum(len(group.parts) for group in groups), with_gain)
     phi, groups = _start(groups, D, size)
     scale = units_of_body(max(abs(float(phi[0])), LEAST_MASS), size)
-    found = settled(groups, phi, _Equations(D), C, ladder, scale, FEWEST, ROUNDS, SETTLED)
+    found = settled(groups, phi, _Equations(D), C, ladder, scale, SETTLED)
     phi, models, groups = found.phi, found.models, found.groups
     # Weights come from the noise of as many bands, each found from its rows: Meier 1953, of whose 4 / rows one half is
     # in the noise already.
@@ -251,13 +249,12 @@ class Round(Generic[G]):
 
 
 def settled(
-    groups: tuple[G, ...], phi: Array, equations: Equations[G], C: Array, ladder: Array, scale: Array,
-    fewest: int, most: int, least: float,
-) -> Round[G]:  # fmt: skip
-    """Return the last of `fewest` to `most` rounds: that in which no noise changes by the share `least` or more."""
-    for number in range(1, most + 1):
+    groups: tuple[G, ...], phi: Array, equations: Equations[G], C: Array, ladder: Array, scale: Array, least: float
+) -> Round[G]:
+    """Return the round in which no noise changes by the share `least` or more, or the last of ROUNDS."""
+    for _ in range(ROUNDS):
         now = Round.of(groups, phi, equations, C, ladder, scale)
-        if number >= fewest and now.change < least:
+        if now.change < least:
             break
         groups, phi = now.renewed, now.phi
     return now

@@ -154,7 +154,7 @@ def pseudoinverse(G: Array) -> Array:
     return np.asarray((axes[:, kept] / values[kept]) @ axes[:, kept].T)
 
 
-def unexplained(K: Array, E: Array, S: Array) -> float:
+def left_of_pushes(K: Array, E: Array, S: Array) -> float:
     """Return what the motion and a constant leave of rows K (k, 6 N) of the pushes.
 
     E  (p, k, 12) is what parameters make of the motion, or (12, 12): any motion explains any row
