@@ -231,3 +231,43 @@ def test_a_wrench_that_ros_2_echoed(tmp_path: Path) -> None:
         read_recording(tmp_path / "a.csv")
     for line in ('[0, 1], unit = ["s", "ns"]', "force    = { columns = [3, 4, 5]", "torque   = { columns = [6, 7, 8]"):
         assert line in str(caught.value)
+
+
+# --- arrays of one column, axes in names, dates, blank names, rows of units --------------------
+
+
+def test_an_array_of_one_column_is_that_column(tmp_path: Path) -> None:
+    same(arrays(tmp_path, time=TIME[:, None], force=FORCE, torque=TORQUE, rotation=TURN.matrix))
+
+
+def test_a_wrench_in_the_axes_of_the_world_is_not_read_as_one_of_the_sensor(tmp_path: Path) -> None:
+    with pytest.raises(BadDescription, match="no force and no torque was recognised"):
+        arrays(tmp_path, time=TIME, force_world=FORCE, torque_world=TORQUE, rotation=TURN.matrix)
+
+
+@pytest.mark.parametrize("unit", ["ns", "us", "ms"])
+def test_dates_of_arrays_need_no_unit(tmp_path: Path, unit: str) -> None:
+    dates = np.datetime64("2026-01-01T12:00", "ns") + np.rint(TIME * 1e9).astype("m8[ns]")
+    same(arrays(tmp_path, time=dates.astype(f"M8[{unit}]"), force=FORCE, torque=TORQUE, rotation=TURN.matrix))
+
+
+HEADER = ["t", "fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
+
+
+def test_blank_names_are_no_name_that_is_given_twice(tmp_path: Path) -> None:
+    blank = np.zeros(ROWS)
+    same(table(tmp_path, ",".join(["", *HEADER, ""]), blank, TIME, FORCE, TORQUE, WXYZ, blank))
+
+
+@pytest.mark.parametrize("brackets", ["{}", "[{}]", "({})"])
+def test_a_row_of_units_under_usual_names_is_read(tmp_path: Path, brackets: str) -> None:
+    words = ["ms", *["kN"] * 3, *["N*mm"] * 3, "-", "-", "-"]
+    units = [*map(brackets.format, words), ""]
+    header = "\n".join([",".join(HEADER), ",".join(units)])
+    same(table(tmp_path, header, TIME * 1e3, FORCE / 1e3, TORQUE * 1e3, WXYZ))
+
+
+def test_a_unit_in_a_row_of_units_may_be_unknown(tmp_path: Path) -> None:
+    header = "\n".join([",".join(HEADER), "s,kp,kp,kp,,,,,,,"])
+    with pytest.raises(BadDescription, match='unknown unit "kp" of force'):
+        table(tmp_path, header, TIME, FORCE, TORQUE, WXYZ)

@@ -356,6 +356,21 @@ def test_parquet(tmp_path: Path) -> None:
     assert stream.channels["force"].tolist() == [FORCE] * 4
 
 
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+@pytest.mark.parametrize("said", ["", ', unit = "us"'])
+def test_dates_of_parquet_need_no_unit(tmp_path: Path, unit: str, said: str) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    columns = dict(zip(COLUMNS, ROWS.T, strict=True))
+    dates = np.datetime64("2026-01-01T12:00") + np.arange(4) * np.timedelta64(2, "ms")
+    columns["t"] = arrow.array(dates.astype(f"M8[{unit}]"))
+    parquet.write_table(arrow.table(columns), tmp_path / "a.parquet")
+    text = (STREAM + BY_NAME).replace("a.csv", "a.parquet").replace('["t"]', f'["t"]{said}')
+    stream = only(read(tmp_path, text))
+    assert stream.time is not None
+    np.testing.assert_allclose(np.diff(stream.time), 0.002)
+
+
 def test_one_file_may_serve_two_streams_and_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from steelyard.io.tables.text_table import TextTable
 

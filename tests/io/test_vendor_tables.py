@@ -134,6 +134,23 @@ def test_a_cut_last_line_is_left_out(tmp_path: Path, left: str, mark: str) -> No
     same(only(recording))
 
 
+@pytest.mark.parametrize("mark", [",", ";", "\t", " "])
+@pytest.mark.parametrize("word", ["NA", "<NA>", "N/A", "#N/A", "null", "NULL", "None", "-nan(ind)", '"NA"'])
+def test_words_for_missing_numbers(tmp_path: Path, mark: str, word: str) -> None:
+    rows = lines(mark)
+    rows[8] = mark.join([*rows[8].split(mark)[:2], word, *rows[8].split(mark)[3:]])
+    log = read(tmp_path, "\n".join(rows))
+    same(only(log), np.delete(TABLE, 7, axis=0))
+    assert "1 of 30 rows of 'a.csv' miss a number in force: row 8." in log.findings[0].message
+
+
+def test_words_that_begin_like_missing_numbers_are_none(tmp_path: Path) -> None:
+    rows = lines()
+    rows[8] = rows[8].replace(",", ",NAN2,", 1).rsplit(",", 1)[0]
+    with pytest.raises(BadFile, match=r'line 9, column "fx" holds "NAN2", which is not a number'):
+        read(tmp_path, "\n".join(rows))
+
+
 def test_a_cut_line_elsewhere_is_refused(tmp_path: Path) -> None:
     rows = lines()
     for text in ("\n".join([*rows[:9], "0.3,1,2", *rows[9:]]), "\n".join([*rows, "0.3,1,2", ""])):

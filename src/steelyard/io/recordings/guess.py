@@ -1,6 +1,7 @@
 """A bare data file becomes a description when its column names are the usual ones.
 
-A unit in brackets is taken; a vector whose meaning its numbers leave open (gx may be a gyro) is left out.
+A unit in brackets is taken, or in a row under the header; a vector whose meaning its numbers leave open (gx may be a
+gyro) is left out.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from steelyard.io.units import SLOWEST, UNITS, converted, median_size, stamp_uni
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
 _UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
+
+_NO_UNIT = {"", "-", "–"}  # what a row of units holds where there is none
 
 _NEW_POSE = float(np.cos(np.radians(5)))
 
@@ -98,13 +101,17 @@ def _simplified(table: Table) -> Names:
         raise cannot_tell(table, "the file has no header", numbered_lines(table))
     plain: dict[str, int] = {}
     units: dict[int, str] = {}
-    inner = {n for group in header.groups.values() for n in group}
+    inner = {n for group in header.groups.values() if len(group) > 1 for n in group}
+    alone = {group[0]: name for name, group in header.groups.items() if len(group) == 1}  # (N, 1), as MATLAB has them
     for number, name in enumerate(header.names):
+        name = alone.get(number, name)
         unit = None if number in inner else _UNIT.search(name)
         if unit:
             units[number] = unit.group(1)
+        elif header.units and (below := header.units[number].strip("[]() ")) not in _NO_UNIT:
+            units[number] = below
         simple = compared(name[: unit.start()] if unit else name)
-        if simple in plain:
+        if simple and simple in plain:
             known = Names(plain, units, header.dates, header.words)
             raise cannot_tell(table, f'two columns are called "{simple}"', own_lines(table, known))
         plain[simple] = number

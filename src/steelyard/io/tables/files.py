@@ -28,6 +28,7 @@ class Header:
     groups  arrays with several columns (NPZ, lists in cells): name -> its column numbers
     dates   numbers of the columns of a text that hold dates
     words   numbers of the columns of a text that hold neither numbers nor dates
+    units   words of a row of units under the header, one per column; none where there is no such row
     shapes  shape of every array of an NPZ, also of those that are no columns
     """
 
@@ -36,6 +37,7 @@ class Header:
     groups: dict[str, tuple[int, ...]] = field(default_factory=dict)
     dates: tuple[int, ...] = ()
     words: tuple[int, ...] = ()
+    units: tuple[str, ...] = ()
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     def shown(self) -> list[str]:

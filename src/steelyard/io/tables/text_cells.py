@@ -1,7 +1,8 @@
 """What a cell of a text table may be, and blocks of such cells made plain for numpy's reader.
 
-A cell is a number, nothing, a stamp as ISO 8601, or, between semicolons or tabs, a number with a decimal comma. It may
-hold a list of numbers, as pandas writes columns of arrays: "[0.1, 0.2]" becomes cells of their own.
+A cell is a number, nothing or a word for it (NA, null), a stamp as ISO 8601, or, between semicolons or tabs, a number
+with a decimal comma. It may hold a list of numbers, as pandas writes columns of arrays: "[0.1, 0.2]" becomes cells of
+their own.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ _STAMPS = re.compile(rf"(?:(?:{_STAMP_FORM}|nan)\n)*")
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}\b.*|\d{1,2}:\d\d\b.*")
 # What a decimal point becomes where commas are the decimals: 1.234,5 or 1.234 may mean thousands, so is no number.
 _NO_POINT = "\x01"  # binary, so in no text
+
+# What R, pandas, SQL, spreadsheets and the C library of Windows write where a number is missing.
+_MISSING = re.compile(r'(?<![^\s,;"])(?:NA|<NA>|N/A|n/a|#N/A|NULL|null|None|-?nan\(ind\))(?![^\s,;"])')
 
 # Numbers between brackets, in quotes where the delimiter may stand among them; matrices are lists of lists.
 _LIST = re.compile(r'"\s*(\[[^"]*\])\s*"|(\[[^"\[\];\t]*\])')
@@ -111,7 +115,8 @@ def with_commas(cell: str) -> str:
 
 
 def filled(block: str, delimiter: str | None) -> str:
-    """Return a block with nan in its empty cells."""
+    """Return a block with nan in cells that are empty or hold a word for it."""
+    block = _MISSING.sub("nan", block)
     if delimiter is None:
         return block
     mark = re.escape(delimiter)
