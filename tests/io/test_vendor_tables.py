@@ -151,6 +151,25 @@ def test_words_that_begin_like_missing_numbers_are_none(tmp_path: Path) -> None:
         read(tmp_path, "\n".join(rows))
 
 
+@pytest.mark.parametrize("end", ["   ", "\t", " # the end", "\n# the end", "\n  "])
+@pytest.mark.parametrize("mark", [",", " "])
+def test_a_last_line_without_its_end_that_is_whole_is_kept(tmp_path: Path, end: str, mark: str) -> None:
+    recording = read(tmp_path, "\n".join(lines(mark)) + end)
+    assert not recording.findings
+    same(only(recording))
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t", " "])
+def test_lines_of_blanks_are_no_rows(tmp_path: Path, mark: str) -> None:
+    recording = read(tmp_path, "\n   \n".join(lines(mark)))
+    assert not recording.findings
+    same(only(recording))
+
+
+def test_a_cut_last_line_below_a_preamble(tmp_path: Path) -> None:
+    same(only(read(tmp_path, "\n".join(["Rate: 100 Hz", *lines(), "0.3,1,2"]))))
+
+
 def test_a_cut_line_elsewhere_is_refused(tmp_path: Path) -> None:
     rows = lines()
     for text in ("\n".join([*rows[:9], "0.3,1,2", *rows[9:]]), "\n".join([*rows, "0.3,1,2", ""])):
@@ -414,3 +433,70 @@ rotation = { columns = ["q"], form = "quaternion-wxyz" }
     )
     with pytest.raises(BadFile, match="line 3 has 10 cells, the rows before it have 11"):
         read_recording(tmp_path / "log.toml")
+
+
+# --- headers --------------------
+
+NUMBERED = TOML
+for name in reversed(NAMES):
+    NUMBERED = NUMBERED.replace(f'"{name}"', str(NAMES.index(name))).replace('"{}"] }}', "0] }}")
+
+
+def numbered(folder: Path, text: str | bytes) -> Stream:
+    """Return what is read of a table without usual names, its columns told by number."""
+    (folder / "a.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    (folder / "log.toml").write_text(NUMBERED.format("a.csv"))
+    return only(read_recording(folder / "log.toml"))
+
+
+def test_columns_that_pandas_counts_in_the_header_are_no_row(tmp_path: Path) -> None:
+    same(numbered(tmp_path, "\n".join(lines(names=[str(k) for k in range(11)]))))
+
+
+def test_the_mark_of_windows_editors_in_front_of_numbers(tmp_path: Path) -> None:
+    same(numbered(tmp_path, b"\xef\xbb\xbf" + "\n".join(lines()[1:]).encode()))
+
+
+def test_a_row_that_is_commented_out_is_no_header(tmp_path: Path) -> None:
+    head, first, *body = lines()
+    same(only(read(tmp_path, "\n".join([f"# {head}", f"# {first}", *body]))), TABLE[1:])
+
+
+def test_rows_that_end_in_a_delimiter_their_header_does_not_have(tmp_path: Path) -> None:
+    head, *body = lines()
+    same(only(read(tmp_path, "\n".join([head, *(f"{row}," for row in body)]))))
+
+
+def test_quoted_names_behind_blanks(tmp_path: Path) -> None:
+    head, *body = lines()
+    same(only(read(tmp_path, "\n".join([", ".join(f'"{name}"' for name in NAMES), *body]))))
+    assert head
+
+
+def test_semicolons_within_quoted_lists_are_no_delimiter(tmp_path: Path) -> None:
+    rows = [
+        f'{r[0]:.9g},"[{";".join(f"{v:.9g}" for v in r[1:4])}]",' + ",".join(f"{v:.9g}" for v in r[4:]) for r in TABLE
+    ]
+    toml = TOML.format("a.csv", "t").replace('"fx", "fy", "fz"', '"force"')
+    (tmp_path / "a.csv").write_text("\n".join(["t,force,tx,ty,tz,qw,qx,qy,qz", *rows]))
+    (tmp_path / "log.toml").write_text(toml)
+    same(only(read_recording(tmp_path / "log.toml")))
+
+
+def test_a_number_with_underscores_is_named(tmp_path: Path) -> None:
+    rows = lines()
+    rows[3] = rows[3].replace(",", ",1_000", 1)
+    with pytest.raises(BadFile, match='line 4, column "fx" holds "1_000'):
+        read(tmp_path, "\n".join(rows))
+
+
+def test_a_small_file_may_unpack_to_many_times_its_size(tmp_path: Path) -> None:
+    rows = [f"{k},1,2,3,4,5,6,1,0,0,0".ljust(200) for k in range(3000)]
+    packed = gzip.compress("\n".join([",".join(NAMES), *rows]).encode())
+    assert 200 * len(rows) > 20 * len(packed)
+    assert len(only(read(tmp_path, packed, name="a.csv.gz"))) == len(rows)
+
+
+def test_binary_data_without_zeros_is_no_text(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match="expected a text table; found binary data"):
+        read(tmp_path, bytes(range(1, 32)) * 99)

@@ -31,6 +31,7 @@ _NO_POINT = "\x01"  # binary, so in no text
 
 # What R, pandas, SQL, spreadsheets and the C library of Windows write where a number is missing.
 _MISSING = re.compile(r'(?<![^\s,;"])(?:NA|<NA>|N/A|n/a|#N/A|NULL|null|None|-?nan\(ind\))(?![^\s,;"])')
+_BLANK = re.compile("^ ++$", re.MULTILINE)
 
 # Numbers between brackets, in quotes where the delimiter may stand among them; matrices are lists of lists.
 _LIST = re.compile(r'"\s*(\[[^"]*\])\s*"|(\[[^"\[\];\t]*\])')
@@ -115,8 +116,8 @@ def with_commas(cell: str) -> str:
 
 
 def filled(block: str, delimiter: str | None) -> str:
-    """Return a block with nan in cells that are empty or hold a word for it."""
-    block = _MISSING.sub("nan", block)
+    """Return a block with nan in cells that are empty or hold a word for it, and nothing in lines of blanks."""
+    block = _BLANK.sub("", _MISSING.sub("nan", block))
     if delimiter is None:
         return block
     mark = re.escape(delimiter)
@@ -137,7 +138,7 @@ def completed(block: str, delimiter: str | None, first: Sequence[str]) -> str:
         return block
     cells = line.split() if delimiter is None else line.split(delimiter)
     last = cells[-1].strip().strip('"')
-    half = last and not _is_datum(last, delimiter) and _is_datum(first[-1], delimiter)
+    half = last and not _is_datum(last, delimiter)  # of a column of words, which nobody reads, no matter
     if len(cells) > len(first) or (len(cells) == len(first) and not half):
         return block
     mark = " " if delimiter is None else delimiter

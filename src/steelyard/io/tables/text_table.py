@@ -242,4 +242,4 @@ def _comment_header(lines: list[str], delimiter: str | None, count: int) -> tupl
 def _counted(cells: Sequence[str]) -> bool:
     """Whether the cells are 0, 1, 2, ..: the header that pandas writes for columns without names."""
     named = [cell for cell in cells if cell]
-    return (len(named) > 2 or not cells[0]) and named == [str(i) for i in range(len(named))]
+    return len(named) > 2 and named == [str(i) for i in range(len(named))]
