@@ -250,6 +250,21 @@ def test_dates_share_an_origin_with_other_clocks(tmp_path: Path) -> None:
     np.testing.assert_allclose(first.time, second.time, atol=1e-6)
 
 
+@pytest.mark.parametrize("mark", [",", ";"])
+def test_times_of_day(tmp_path: Path, mark: str) -> None:
+    stamps = [f"09:59:59.{900 + 10 * i}" for i in range(10)] + [f"10:00:00.{10 * i:03d}" for i in range(20)]
+    text = with_stamps(stamps, mark)
+    (tmp_path / "bare.csv").write_text(text)
+    for log in (read_recording(tmp_path / "bare.csv"), read(tmp_path, text if mark == "," else text.replace(".", ","))):
+        same(only(log))
+
+
+def test_a_log_over_midnight_without_a_date_is_refused(tmp_path: Path) -> None:
+    stamps = [f"23:59:59.{970 + 10 * i}" for i in range(3)] + [f"00:00:00.{10 * i:03d}" for i in range(27)]
+    with pytest.raises(BadValue, match="time must not go back; it does once, from"):
+        read(tmp_path, with_stamps(stamps))
+
+
 def test_dates_in_a_bare_table(tmp_path: Path) -> None:
     stamps = [f"2024-05-01T12:00:00.{10 * i:03d}Z" for i in range(30)]
     (tmp_path / "a.csv").write_text(with_stamps(stamps))
