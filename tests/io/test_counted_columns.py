@@ -271,3 +271,9 @@ def test_a_unit_in_a_row_of_units_may_be_unknown(tmp_path: Path) -> None:
     header = "\n".join([",".join(HEADER), "s,kp,kp,kp,,,,,,,"])
     with pytest.raises(BadDescription, match='unknown unit "kp" of force'):
         table(tmp_path, header, TIME, FORCE, TORQUE, WXYZ)
+
+
+def test_of_two_columns_with_a_unit_of_time_none_is_the_clock(tmp_path: Path) -> None:
+    header = ",".join(["Beginn [s]", "Ende [s]", *HEADER[1:]])
+    (stream,) = table(tmp_path, header, TIME, TIME + 1, FORCE, TORQUE, WXYZ).streams
+    assert stream.time is None

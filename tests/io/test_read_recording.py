@@ -342,6 +342,38 @@ def test_npz(tmp_path: Path) -> None:
     assert stream.channels["force"].dtype == np.float64
 
 
+def test_npz_holds_nanoseconds_since_1970_and_arrays_of_any_width(tmp_path: Path) -> None:
+    turns, images = np.broadcast_to(np.eye(3), (4, 3, 3)), np.zeros((4, 300, 300), np.uint8)
+    stamps = 1708857503931759123 + np.arange(4, dtype=np.uint64)
+    np.savez(tmp_path / "a.npz", t=stamps, w=ROWS[:, 1:7], R=turns, images=images)
+    toml = """
+        [[stream]]
+        path = "a.npz"
+        time = { columns = ["t"], unit = "ns" }
+        force = { columns = ["w[0]", "w[1]", "w[2]"] }
+        torque = { columns = ["w[3]", "w[4]", "w[5]"] }
+        rotation = { columns = ["R"], form = "matrix" }
+    """
+    time = only(read(tmp_path, toml)).time
+    assert time is not None
+    np.testing.assert_allclose(np.diff(time), 1e-9, rtol=1e-6)
+
+
+def test_decimals_and_nulls_of_parquet(tmp_path: Path) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    many = np.repeat(ROWS, 10, axis=0)
+    columns = dict(zip(COLUMNS, many.T, strict=True))
+    columns["t"] = arrow.array(np.arange(40), mask=np.arange(40) == 5)
+    columns["fx"] = arrow.array(many[:, 1].astype(int)).cast(arrow.decimal128(25, 3))
+    columns["fy"] = arrow.array(many[:, 2], mask=np.arange(40) == 7)
+    parquet.write_table(arrow.table(columns), tmp_path / "a.parquet")
+    recording = read(tmp_path, (STREAM + BY_NAME).replace("a.csv", "a.parquet").replace('["t"]', '["t"], unit = "ms"'))
+    stream = only(recording)
+    assert "2 of 40 rows of 'a.parquet' miss a number in force, time: rows 6, 8." in recording.findings[0].message
+    assert stream.channels["force"].tolist() == [FORCE] * 38
+
+
 def test_parquet(tmp_path: Path) -> None:
     arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
     parquet = pytest.importorskip("pyarrow.parquet")

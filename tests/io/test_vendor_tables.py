@@ -250,6 +250,13 @@ def test_dates_share_an_origin_with_other_clocks(tmp_path: Path) -> None:
     np.testing.assert_allclose(first.time, second.time, atol=1e-6)
 
 
+def test_of_two_columns_of_dates_none_is_the_clock(tmp_path: Path) -> None:
+    rows = with_stamps([f"2024-05-01T12:00:00.{10 * i:03d}Z" for i in range(30)]).split("\n")
+    text = "\n".join([f"{rows[0][2:]},begun,ended", *(f"{r[r.index(',') + 1 :]},{r[:24]},{r[:24]}" for r in rows[1:])])
+    (tmp_path / "a.csv").write_text(text)
+    assert only(read_recording(tmp_path / "a.csv")).time is None
+
+
 @pytest.mark.parametrize("mark", [",", ";"])
 def test_times_of_day(tmp_path: Path, mark: str) -> None:
     stamps = [f"09:59:59.{900 + 10 * i}" for i in range(10)] + [f"10:00:00.{10 * i:03d}" for i in range(20)]
