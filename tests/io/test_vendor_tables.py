@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import re
 from pathlib import Path
 
 import numpy as np
@@ -321,6 +322,38 @@ def test_two_rows_of_words_are_refused(tmp_path: Path) -> None:
         read(tmp_path, "\n".join([head, units.replace("s", "1", 1), *body]))
     with pytest.raises(BadFile, match="the header has 11 names, but its rows have 12 cells"):
         read(tmp_path, "\n".join([head, units, *(f"{row};1" for row in body)]))
+
+
+@pytest.mark.parametrize(
+    ("name", "over", "said"),
+    [
+        ("t", "ms", "time: over column 0 the file says ms, and the description s. Write unit = "),
+        ("fy", "kN", "force: over column 2 the file says kN, and the description N. Write unit = "),
+        ("tz", "N·mm", "torque: over column 6 the file says N*mm, and the description N*m. Write unit = "),
+    ],
+)
+def test_a_unit_of_the_file_that_the_description_contradicts_is_refused(
+    tmp_path: Path, name: str, over: str, said: str
+) -> None:
+    head, *body = lines(";")
+    units = ";".join(over if each == name else "-" for each in NAMES)
+    called = f"{name} [{over}]"
+    for rows, toml in (
+        ([head, units, *body], TOML),
+        ([head.replace(name, called, 1), *body], TOML.replace(f'"{name}"', f'"{called}"')),
+    ):
+        (tmp_path / "a.csv").write_text("\n".join(rows))
+        (tmp_path / "log.toml").write_text(toml.format("a.csv", called if name == "t" and rows[1] != units else "t"))
+        with pytest.raises(BadInput, match=re.escape(said)):
+            read_recording(tmp_path / "log.toml")
+
+
+def test_units_of_the_file_that_the_description_repeats_or_nobody_knows_are_passed_over(tmp_path: Path) -> None:
+    head, *body = lines(";")
+    toml = TOML.format("a.csv", "t").replace('"tz"]', '"tz"], unit = "N*mm"')
+    (tmp_path / "a.csv").write_text("\n".join([head, "s;N;kp;?;Nmm;N.mm;N mm;1/s;-;-;-", *body]))
+    (tmp_path / "log.toml").write_text(toml)
+    np.testing.assert_allclose(only(read_recording(tmp_path / "log.toml")).channels["torque"], TABLE[:, 4:7] / 1e3)
 
 
 @pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "cp1252", "latin-1"])

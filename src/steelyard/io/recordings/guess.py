@@ -6,7 +6,6 @@ gyro) is left out.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -22,10 +21,8 @@ from steelyard.io.streams.channels import channel_with_gaps, stand_apart
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.streams.usual_names import STEMS, Names, compared
 from steelyard.io.tables.files import Columns, Table
-from steelyard.io.units import SLOWEST, UNITS, converted, median_size, stamp_unit, unit_by_size
+from steelyard.io.units import SLOWEST, UNITS, apart, converted, median_size, stamp_unit, unit_by_size
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
-
-_UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
 
 _NO_UNIT = {"", "-", "–"}  # what a row of units holds where there is none
 
@@ -105,12 +102,11 @@ def _simplified(table: Table) -> Names:
     alone = {group[0]: name for name, group in header.groups.items() if len(group) == 1}  # (N, 1), as MATLAB has them
     for number, name in enumerate(header.names):
         name = alone.get(number, name)
-        unit = None if number in inner else _UNIT.search(name)
-        if unit:
-            units[number] = unit.group(1)
-        elif header.units and (below := header.units[number].strip("[]() ")) not in _NO_UNIT:
-            units[number] = below
-        simple = compared(name[: unit.start()] if unit else name)
+        plain_name, unit = (name, "") if number in inner else apart(name)
+        unit = unit or header.unit(number)
+        if unit not in _NO_UNIT:
+            units[number] = unit
+        simple = compared(plain_name)
         if simple and simple in plain:
             known = Names(plain, units, header.dates, header.words)
             raise cannot_tell(table, f'two columns are called "{simple}"', own_lines(table, known))
