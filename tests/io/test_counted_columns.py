@@ -9,7 +9,7 @@ import pytest
 
 from steelyard.errors import BadDescription
 from steelyard.io import read_recording
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD, Recording, Stream
 from steelyard.spatial import Rotation
 
 ROWS = 40
@@ -277,3 +277,38 @@ def test_of_two_columns_with_a_unit_of_time_none_is_the_clock(tmp_path: Path) ->
     header = ",".join(["Beginn [s]", "Ende [s]", *HEADER[1:]])
     (stream,) = table(tmp_path, header, TIME, TIME + 1, FORCE, TORQUE, WXYZ).streams
     assert stream.time is None
+
+
+# --- what is not taken --------------------
+
+
+def test_columns_counted_from_one_or_with_a_gap_are_no_array(tmp_path: Path) -> None:
+    header = ",".join(["t", *counted("force_{}", 4)[1:], *counted("torque_{}", 4)[:2], "torque_3", *HEADER[7:]])
+    with pytest.raises(BadDescription, match="no force and no torque was recognised"):
+        table(tmp_path, header, TIME, FORCE, TORQUE, WXYZ)
+
+
+@pytest.mark.parametrize("made", ["scaled", "in one place"])
+def test_sixteen_numbers_that_do_not_show_to_be_a_pose_are_none(tmp_path: Path, made: str) -> None:
+    pose = POSE.copy()
+    if made == "scaled":
+        pose[:, :3, :3] *= 1.1
+    else:  # row by row and column by column look alike
+        pose[:, :3, 3] = 0
+    with pytest.raises(BadDescription, match="nothing says where gravity points"):
+        arrays(tmp_path, time=TIME, force=FORCE, torque=TORQUE, pose=pose)
+
+
+def test_joints_that_were_measured_are_suggested_not_those_that_were_wanted(tmp_path: Path) -> None:
+    header = ",".join(["t", *counted("target_q_{}", 6), *counted("actual_q_{}", 6), *HEADER[1:7]])
+    six = np.tile(TIME[:, None], 6)
+    with pytest.raises(BadDescription) as caught:
+        table(tmp_path, header, TIME, six, six, FORCE, TORQUE)
+    assert 'joint_position = { columns = ["actual_q_0", "actual_q_1", ' in str(caught.value)
+
+
+def test_gravity_that_a_bare_file_does_not_say_is_as_sure_as_the_earth_is_round(tmp_path: Path) -> None:
+    assumed = arrays(tmp_path, time=TIME, force=FORCE, torque=TORQUE, rotation=TURN.matrix)
+    down = TURN.inverse().apply(np.tile([0, 0, -9.81], (ROWS, 1)))
+    told = arrays(tmp_path, time=TIME, force=FORCE, torque=TORQUE, rotation=TURN.matrix, gravity=down)
+    assert (assumed.gravity_std, told.gravity_std) == (ASSUMED_GRAVITY_STD, 0.0)

@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from steelyard.errors import BadDescription, BadValue
 from steelyard.io import read_recording
+from steelyard.io.rotations import rotation_of
+from steelyard.io.units import local_g
 from steelyard.logs.recording import STANDARD_GRAVITY, Recording, Stream
 from steelyard.spatial import Rotation
 
@@ -434,3 +437,43 @@ def test_data_folder_then_environment_then_beside_the_description(
     assert found(None) == 1
     assert found(tmp_path / "data") == 2
     assert found(tmp_path / "not here") == 1
+
+
+# --- limits of rotations and of one g --------------------
+
+
+@pytest.mark.parametrize(("angle", "good"), [(12.5, True), (12.6, False)])
+def test_angles_in_radians_may_reach_two_turns(angle: float, good: bool) -> None:
+    if good:
+        rotation_of(np.array([[0.0, 0.1, angle]]), "rpy")
+    else:
+        with pytest.raises(BadValue, match="it looks like degrees"):
+            rotation_of(np.array([[0.0, 0.1, angle]]), "rpy")
+
+
+@pytest.mark.parametrize(("length", "good"), [(0.96, True), (1.04, True), (0.94, False), (1.06, False)])
+def test_quaternions_may_be_off_by_a_twentieth(length: float, good: bool) -> None:
+    numbers = length * np.array([[0.5, 0.5, 0.5, 0.5]])
+    if good:
+        assert np.isclose(np.linalg.det(rotation_of(numbers, "quaternion-xyzw").matrix), 1)
+    else:
+        with pytest.raises(BadValue, match="the quaternion must have norm 1"):
+            rotation_of(numbers, "quaternion-xyzw")
+
+
+def test_a_matrix_of_three_digits_becomes_a_rotation() -> None:
+    true = Rotation.exp(np.random.default_rng(0).normal(size=(50, 3)))
+    found = rotation_of(true.matrix.round(3).reshape(-1, 9), "matrix").matrix
+    assert np.abs(np.swapaxes(found, 1, 2) @ found - np.eye(3)).max() < 1e-14
+    assert np.abs(found - true.matrix).max() < 1e-3
+
+
+@pytest.mark.parametrize(("size", "g"), [(9.77, 9.77), (9.83, 9.83), (9.7, STANDARD_GRAVITY), (9.9, STANDARD_GRAVITY)])
+def test_one_g_is_that_of_a_place_on_earth(size: float, g: float) -> None:
+    assert local_g(np.array([0.0, 0.0, -size])) == g
+
+
+def test_a_passive_wrist_is_told_where_its_force_is(tmp_path: Path) -> None:
+    toml = STREAM + TIME + 'torque = "zero"\n' + TURN + STREAM + TIME + 'force = { columns = ["fx", "fy", "fz"] }\n'
+    with pytest.raises(BadDescription, match='torque = "zero" belongs in the stream that holds "force"'):
+        read(tmp_path, toml, a_csv=PLAIN)
