@@ -26,6 +26,7 @@ from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
 _NO_UNIT = {"", "-", "–"}  # what a row of units holds where there is none
 
+# Half and twice as much do as well: logs turn by a degree or two from row to row, tables of poses by twenty and more.
 _NEW_POSE = float(np.cos(np.radians(5)))
 
 
