@@ -533,7 +533,7 @@ def test_semicolons_within_quoted_lists_are_no_delimiter(tmp_path: Path) -> None
         f'{r[0]:.9g},"[{";".join(f"{v:.9g}" for v in r[1:4])}]",' + ",".join(f"{v:.9g}" for v in r[4:]) for r in TABLE
     ]
     toml = TOML.format("a.csv", "t").replace('"fx", "fy", "fz"', '"force"')
-    (tmp_path / "a.csv").write_text("\n".join(["t,force,tx,ty,tz,qw,qx,qy,qz", *rows]))
+    (tmp_path / "a.csv").write_text("\n".join(["Rate: 100 Hz", "t,force,tx,ty,tz,qw,qx,qy,qz", *rows]))
     (tmp_path / "log.toml").write_text(toml)
     same(only(read_recording(tmp_path / "log.toml")))
 

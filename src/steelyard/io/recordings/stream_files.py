@@ -165,7 +165,7 @@ def _channels(spec: StreamSpec, table: Table, cells: Columns, gravity: Array) ->
         columns = [cells[n].astype(np.float64, copy=False) for n in _numbers(quantity, table)]
         values = channel_with_gaps(quantity, columns, gravity)
         out[quantity.name] = values
-        if quantity.name in ("force", "torque") and not np.nan_to_num(values).any():
+        if quantity.name in ("force", "torque") and len(values) and not np.nan_to_num(values).any():
             passive = ' or say torque = "zero" if the wrist passes no moment' if quantity.name == "torque" else ""
             raise BadValue(
                 f"{spec.where}: {quantity.name} is zero in every row. Give the columns that hold it{passive}."
