@@ -134,6 +134,15 @@ def test_names_may_have_a_prefix_or_stand_in_a_path(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found["rotation"], expected["rotation"])
 
 
+def test_a_joint_whose_name_begins_like_another_is_told_from_it(tmp_path: Path) -> None:
+    """wrist_1 and wrist_12: one name stands in the other."""
+    expected = read_recording(write(tmp_path)).streams[1].channels
+    path = write(tmp_path, TOML.replace('"wrist_3"', '"wrist_12"'))
+    for name in ("log.csv", "arm.urdf"):
+        (tmp_path / name).write_text((tmp_path / name).read_text().replace("wrist_3", "wrist_12"))
+    np.testing.assert_array_equal(read_recording(path).streams[1].channels["rotation"], expected["rotation"])
+
+
 def test_a_name_that_is_misspelt_is_not_taken_by_its_place(tmp_path: Path) -> None:
     path = write(tmp_path, TOML.replace('"elbow"', '"elbw"'))
     (tmp_path / "log.csv").write_text((tmp_path / "log.csv").read_text().replace("elbow", "elbw"))
@@ -207,6 +216,8 @@ FILES = {
     "no axis": ('<axis xyz="0 0 2"/><limit', '<axis xyz="0 0 0"/><limit', 'DIR/arm.urdf: joint "wrist_3" has an axis of length zero.'),
     "circle": ('<parent link="world"/>', '<parent link="f"/>', 'DIR/arm.urdf: the joints before link "tool0" go round in a circle.'),
     "carried twice": ('<child link="tip"/>', '<child link="tool0"/>', 'DIR/arm.urdf: joints "flange" and "finger" both carry "tool0".'),
+    "mimic": ('<axis xyz="0 0 2"/><limit', '<mimic joint="elbow"/><axis xyz="0 0 2"/><limit', 'DIR/arm.urdf: joint "flange" mimics another. Name a link before it as the sensor\'s.'),
+    "letters": ('xyz="0.0 0 0.8"', 'xyz="0.0 0 high"', 'DIR/arm.urdf: joint "stand" needs three numbers as xyz; got "0.0 0 high".'),
     "no child": ('<child link="tool0"/>', "", 'DIR/arm.urdf: joint "flange" names no child link.'),
 }  # fmt: skip
 

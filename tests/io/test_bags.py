@@ -218,6 +218,27 @@ def test_publishers_take_turns_on_a_topic(tmp_path: Path) -> None:
     assert table.read([place["position[grip]"]])[place["position[grip]"]].tolist() == [9]
 
 
+def test_a_state_without_its_numbers_is_passed_over(tmp_path: Path) -> None:
+    write_bag(
+        tmp_path / "run", [joints(1, ("a", "b"), (1, 2)), joints(2, ("a", "b"), ()), joints(3, ("a", "b"), (3, 4))]
+    )
+    table = open_table(tmp_path / "run", "/joints")
+    assert [column.tolist() for column in table.read([0, 2, 3], (0,)).values()] == [[1, 3], [1, 3], [2, 4]]
+
+
+def test_lists_of_unlike_lengths_are_named(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run", [joints(1, (), (1, 2)), joints(2, (), (1, 2, 3))])
+    with pytest.raises(BadInput, match='message 2 of topic "/joints" lists 3 numbers in "position", others 2'):
+        open_table(tmp_path / "run", "/joints").read([0, 2], (0,))
+
+
+def test_a_topic_is_bounded_by_its_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_bag(tmp_path / "run", [joints(n, ("a", "b"), (1, 2)) for n in range(1, 100)])
+    monkeypatch.setattr("steelyard.io.contents.MOST_BYTES", 1000)
+    with pytest.raises(BadInput, match="Give fewer rows"):
+        open_table(tmp_path / "run", "/joints").read([0, 2], (0,))
+
+
 def test_without_stamps_the_time_of_receipt_counts(tmp_path: Path) -> None:
     maker = Maker(ROS2)
     out: list[Message] = [("/ft", WRENCH, START + n, maker.wrench(0, (n, 0, 0), (0, 0, 0))) for n in range(3)]
@@ -263,6 +284,38 @@ def test_frames_beside_the_way_do_not_matter(tmp_path: Path) -> None:
     assert _table(tmp_path / "run", ("base", "tool")).read([3])[3].tolist() == [0, 1, 2]
     with pytest.raises(BadInput, match='frame "camera" has two parents, "tool" and "base"'):
         _table(tmp_path / "run", ("base", "camera")).read([3])
+
+
+def test_of_fixed_transforms_the_last_counts_and_of_moving_ones_the_most_frequent(tmp_path: Path) -> None:
+    """A calibration is sent again; the arm turns at a quarter of the rate of its tool."""
+    maker, still = Maker(ROS2), Rotation.identity()
+    out: list[Message] = []
+    for height in (1.0, 2.0):
+        told = {("wrist", "tool"): Pose(still, np.array([0.0, 0.0, height]))}
+        out.append(("/robot/tf_static", TF, START, maker.transforms(START + int(height), told)))
+    for n in range(41):
+        told = {("arm", "wrist"): Pose(still, np.array([n, 0.0, 0.0]))}
+        out.append(("/robot/tf", TF, START + n, maker.transforms(START + n, told)))
+        if n % 4 == 0:
+            told = {("base", "arm"): Pose(still, np.array([0.0, n, 0.0]))}
+            out.append(("/robot/tf", TF, START + n, maker.transforms(START + n, told)))
+    out.append(("/tf_static", TF, START, maker.transforms(START, {("base", "shelf"): Pose.identity()})))
+    write_bag(tmp_path / "run", out)
+    read = open_table(tmp_path / "run", "/robot/tf", ("base", "tool")).read(range(4))
+    np.testing.assert_allclose(np.stack([read[n] for n in (1, 2, 3)], 1), [[n, n, 2.0] for n in range(41)], atol=1e-12)
+
+
+def test_transforms_that_hold_no_motion(tmp_path: Path) -> None:
+    maker, here = Maker(ROS2), Pose.identity()
+    out: list[Message] = [("/tf_static", TF, START, maker.transforms(START, {("base", "tool"): here}))]
+    for n in range(3):
+        out.append(("/tf", TF, START + n, maker.transforms(START + n, {("base", "arm"): here})))
+        out.append(("/tf", TF, START + n, maker.transforms(START + 10 + n, {("arm", "hand"): here})))
+    write_bag(tmp_path / "run", out)
+    with pytest.raises(BadInput, match='"tool" does not move in "base": all transforms between them are fixed'):
+        _table(tmp_path / "run", ("base", "tool")).read([3])
+    with pytest.raises(BadInput, match='transforms between "base" and "hand" have no time in common'):
+        _table(tmp_path / "run", ("base", "hand")).read([3])
 
 
 @pytest.mark.parametrize("bad", [1, 5])

@@ -36,6 +36,11 @@ def test_pauses_of_hours_are_no_leaps(hole: float) -> None:
     assert len(Clock.of(np.r_[EVEN, EVEN[-1] + 0.005 + hole + EVEN], "s", "t").stamps) == 8000
 
 
+def test_a_long_log_is_no_leap(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("steelyard.io.streams.clocks._MOST_STEPS", 1000)
+    assert len(Clock.of(EVEN, "s", "t").stamps) == 4000
+
+
 def test_a_table_of_few_poses_may_take_days() -> None:
     assert len(Clock.of(86400.0 * np.arange(8), "s", "t").stamps) == 8
 

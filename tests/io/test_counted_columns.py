@@ -9,7 +9,7 @@ import pytest
 
 from steelyard.errors import BadDescription
 from steelyard.io import read_recording
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD, Recording, Stream
 from steelyard.spatial import Rotation
 
 ROWS = 40
@@ -231,3 +231,84 @@ def test_a_wrench_that_ros_2_echoed(tmp_path: Path) -> None:
         read_recording(tmp_path / "a.csv")
     for line in ('[0, 1], unit = ["s", "ns"]', "force    = { columns = [3, 4, 5]", "torque   = { columns = [6, 7, 8]"):
         assert line in str(caught.value)
+
+
+# --- arrays of one column, axes in names, dates, blank names, rows of units --------------------
+
+
+def test_an_array_of_one_column_is_that_column(tmp_path: Path) -> None:
+    same(arrays(tmp_path, time=TIME[:, None], force=FORCE, torque=TORQUE, rotation=TURN.matrix))
+
+
+def test_a_wrench_in_the_axes_of_the_world_is_not_read_as_one_of_the_sensor(tmp_path: Path) -> None:
+    with pytest.raises(BadDescription, match="no force and no torque was recognised"):
+        arrays(tmp_path, time=TIME, force_world=FORCE, torque_world=TORQUE, rotation=TURN.matrix)
+
+
+@pytest.mark.parametrize("unit", ["ns", "us", "ms"])
+def test_dates_of_arrays_need_no_unit(tmp_path: Path, unit: str) -> None:
+    dates = np.datetime64("2026-01-01T12:00", "ns") + np.rint(TIME * 1e9).astype("m8[ns]")
+    same(arrays(tmp_path, time=dates.astype(f"M8[{unit}]"), force=FORCE, torque=TORQUE, rotation=TURN.matrix))
+
+
+HEADER = ["t", "fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
+
+
+def test_blank_names_are_no_name_that_is_given_twice(tmp_path: Path) -> None:
+    blank = np.zeros(ROWS)
+    same(table(tmp_path, ",".join(["", *HEADER, ""]), blank, TIME, FORCE, TORQUE, WXYZ, blank))
+
+
+@pytest.mark.parametrize("brackets", ["{}", "[{}]", "({})"])
+def test_a_row_of_units_under_usual_names_is_read(tmp_path: Path, brackets: str) -> None:
+    words = ["ms", *["kN"] * 3, *["N*mm"] * 3, "-", "-", "-"]
+    units = [*map(brackets.format, words), ""]
+    header = "\n".join([",".join(HEADER), ",".join(units)])
+    same(table(tmp_path, header, TIME * 1e3, FORCE / 1e3, TORQUE * 1e3, WXYZ))
+
+
+def test_a_unit_in_a_row_of_units_may_be_unknown(tmp_path: Path) -> None:
+    header = "\n".join([",".join(HEADER), "s,kp,kp,kp,,,,,,,"])
+    with pytest.raises(BadDescription, match='unknown unit "kp" of force'):
+        table(tmp_path, header, TIME, FORCE, TORQUE, WXYZ)
+
+
+def test_of_two_columns_with_a_unit_of_time_none_is_the_clock(tmp_path: Path) -> None:
+    header = ",".join(["Beginn [s]", "Ende [s]", *HEADER[1:]])
+    (stream,) = table(tmp_path, header, TIME, TIME + 1, FORCE, TORQUE, WXYZ).streams
+    assert stream.time is None
+
+
+# --- what is not taken --------------------
+
+
+def test_columns_counted_from_one_or_with_a_gap_are_no_array(tmp_path: Path) -> None:
+    header = ",".join(["t", *counted("force_{}", 4)[1:], *counted("torque_{}", 4)[:2], "torque_3", *HEADER[7:]])
+    with pytest.raises(BadDescription, match="no force and no torque was recognised"):
+        table(tmp_path, header, TIME, FORCE, TORQUE, WXYZ)
+
+
+@pytest.mark.parametrize("made", ["scaled", "in one place"])
+def test_sixteen_numbers_that_do_not_show_to_be_a_pose_are_none(tmp_path: Path, made: str) -> None:
+    pose = POSE.copy()
+    if made == "scaled":
+        pose[:, :3, :3] *= 1.1
+    else:  # row by row and column by column look alike
+        pose[:, :3, 3] = 0
+    with pytest.raises(BadDescription, match="nothing says where gravity points"):
+        arrays(tmp_path, time=TIME, force=FORCE, torque=TORQUE, pose=pose)
+
+
+def test_joints_that_were_measured_are_suggested_not_those_that_were_wanted(tmp_path: Path) -> None:
+    header = ",".join(["t", *counted("target_q_{}", 6), *counted("actual_q_{}", 6), *HEADER[1:7]])
+    six = np.tile(TIME[:, None], 6)
+    with pytest.raises(BadDescription) as caught:
+        table(tmp_path, header, TIME, six, six, FORCE, TORQUE)
+    assert 'joint_position = { columns = ["actual_q_0", "actual_q_1", ' in str(caught.value)
+
+
+def test_gravity_that_a_bare_file_does_not_say_is_as_sure_as_the_earth_is_round(tmp_path: Path) -> None:
+    assumed = arrays(tmp_path, time=TIME, force=FORCE, torque=TORQUE, rotation=TURN.matrix)
+    down = TURN.inverse().apply(np.tile([0, 0, -9.81], (ROWS, 1)))
+    told = arrays(tmp_path, time=TIME, force=FORCE, torque=TORQUE, rotation=TURN.matrix, gravity=down)
+    assert (assumed.gravity_std, told.gravity_std) == (ASSUMED_GRAVITY_STD, 0.0)

@@ -52,6 +52,16 @@ def said(recording: Recording) -> list[str]:
     return [finding.message for finding in recording.findings]
 
 
+@pytest.mark.parametrize("count", [10, 11])
+def test_up_to_a_tenth_may_be_missing(tmp_path: Path, count: int) -> None:
+    table = with_gaps(rows(100), *((9 * k + 1, "fy", "nan") for k in range(count)))
+    if count == 10:
+        assert len(read(tmp_path, stream("a", TIME + WRENCH + TURN), a=table).streams[0]) == 90
+    else:
+        with pytest.raises(BadValue, match="force: 11 of 100 rows are NaN, infinite or empty"):
+            read(tmp_path, stream("a", TIME + WRENCH + TURN), a=table)
+
+
 @pytest.mark.parametrize("hole", ["nan", "NaN", "inf", "-inf"])
 def test_rows_are_left_out_and_told(tmp_path: Path, hole: str) -> None:
     table = with_gaps(rows(60), (3, "fy", hole), (17, "ty", hole), (17, "fx", hole), (50, "qw", hole))

@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from steelyard.errors import BadDescription, BadValue
 from steelyard.io import read_recording
+from steelyard.io.rotations import rotation_of
+from steelyard.io.units import local_g
 from steelyard.logs.recording import STANDARD_GRAVITY, Recording, Stream
 from steelyard.spatial import Rotation
 
@@ -342,6 +345,38 @@ def test_npz(tmp_path: Path) -> None:
     assert stream.channels["force"].dtype == np.float64
 
 
+def test_npz_holds_nanoseconds_since_1970_and_arrays_of_any_width(tmp_path: Path) -> None:
+    turns, images = np.broadcast_to(np.eye(3), (4, 3, 3)), np.zeros((4, 300, 300), np.uint8)
+    stamps = 1708857503931759123 + np.arange(4, dtype=np.uint64)
+    np.savez(tmp_path / "a.npz", t=stamps, w=ROWS[:, 1:7], R=turns, images=images)
+    toml = """
+        [[stream]]
+        path = "a.npz"
+        time = { columns = ["t"], unit = "ns" }
+        force = { columns = ["w[0]", "w[1]", "w[2]"] }
+        torque = { columns = ["w[3]", "w[4]", "w[5]"] }
+        rotation = { columns = ["R"], form = "matrix" }
+    """
+    time = only(read(tmp_path, toml)).time
+    assert time is not None
+    np.testing.assert_allclose(np.diff(time), 1e-9, rtol=1e-6)
+
+
+def test_decimals_and_nulls_of_parquet(tmp_path: Path) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    many = np.repeat(ROWS, 10, axis=0)
+    columns = dict(zip(COLUMNS, many.T, strict=True))
+    columns["t"] = arrow.array(np.arange(40), mask=np.arange(40) == 5)
+    columns["fx"] = arrow.array(many[:, 1].astype(int)).cast(arrow.decimal128(25, 3))
+    columns["fy"] = arrow.array(many[:, 2], mask=np.arange(40) == 7)
+    parquet.write_table(arrow.table(columns), tmp_path / "a.parquet")
+    recording = read(tmp_path, (STREAM + BY_NAME).replace("a.csv", "a.parquet").replace('["t"]', '["t"], unit = "ms"'))
+    stream = only(recording)
+    assert "2 of 40 rows of 'a.parquet' miss a number in force, time: rows 6, 8." in recording.findings[0].message
+    assert stream.channels["force"].tolist() == [FORCE] * 38
+
+
 def test_parquet(tmp_path: Path) -> None:
     arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
     parquet = pytest.importorskip("pyarrow.parquet")
@@ -354,6 +389,21 @@ def test_parquet(tmp_path: Path) -> None:
     assert stream.time is not None
     assert stream.time.tolist() == [0.931759, 0.931760, 0.931761, 0.931762]
     assert stream.channels["force"].tolist() == [FORCE] * 4
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+@pytest.mark.parametrize("said", ["", ', unit = "us"'])
+def test_dates_of_parquet_need_no_unit(tmp_path: Path, unit: str, said: str) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    columns = dict(zip(COLUMNS, ROWS.T, strict=True))
+    dates = np.datetime64("2026-01-01T12:00") + np.arange(4) * np.timedelta64(2, "ms")
+    columns["t"] = arrow.array(dates.astype(f"M8[{unit}]"))
+    parquet.write_table(arrow.table(columns), tmp_path / "a.parquet")
+    text = (STREAM + BY_NAME).replace("a.csv", "a.parquet").replace('["t"]', f'["t"]{said}')
+    stream = only(read(tmp_path, text))
+    assert stream.time is not None
+    np.testing.assert_allclose(np.diff(stream.time), 0.002)
 
 
 def test_one_file_may_serve_two_streams_and_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -387,3 +437,43 @@ def test_data_folder_then_environment_then_beside_the_description(
     assert found(None) == 1
     assert found(tmp_path / "data") == 2
     assert found(tmp_path / "not here") == 1
+
+
+# --- limits of rotations and of one g --------------------
+
+
+@pytest.mark.parametrize(("angle", "good"), [(12.5, True), (12.6, False)])
+def test_angles_in_radians_may_reach_two_turns(angle: float, good: bool) -> None:
+    if good:
+        rotation_of(np.array([[0.0, 0.1, angle]]), "rpy")
+    else:
+        with pytest.raises(BadValue, match="it looks like degrees"):
+            rotation_of(np.array([[0.0, 0.1, angle]]), "rpy")
+
+
+@pytest.mark.parametrize(("length", "good"), [(0.96, True), (1.04, True), (0.94, False), (1.06, False)])
+def test_quaternions_may_be_off_by_a_twentieth(length: float, good: bool) -> None:
+    numbers = length * np.array([[0.5, 0.5, 0.5, 0.5]])
+    if good:
+        assert np.isclose(np.linalg.det(rotation_of(numbers, "quaternion-xyzw").matrix), 1)
+    else:
+        with pytest.raises(BadValue, match="the quaternion must have norm 1"):
+            rotation_of(numbers, "quaternion-xyzw")
+
+
+def test_a_matrix_of_three_digits_becomes_a_rotation() -> None:
+    true = Rotation.exp(np.random.default_rng(0).normal(size=(50, 3)))
+    found = rotation_of(true.matrix.round(3).reshape(-1, 9), "matrix").matrix
+    assert np.abs(np.swapaxes(found, 1, 2) @ found - np.eye(3)).max() < 1e-14
+    assert np.abs(found - true.matrix).max() < 1e-3
+
+
+@pytest.mark.parametrize(("size", "g"), [(9.77, 9.77), (9.83, 9.83), (9.7, STANDARD_GRAVITY), (9.9, STANDARD_GRAVITY)])
+def test_one_g_is_that_of_a_place_on_earth(size: float, g: float) -> None:
+    assert local_g(np.array([0.0, 0.0, -size])) == g
+
+
+def test_a_passive_wrist_is_told_where_its_force_is(tmp_path: Path) -> None:
+    toml = STREAM + TIME + 'torque = "zero"\n' + TURN + STREAM + TIME + 'force = { columns = ["fx", "fy", "fz"] }\n'
+    with pytest.raises(BadDescription, match='torque = "zero" belongs in the stream that holds "force"'):
+        read(tmp_path, toml, a_csv=PLAIN)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import re
 from pathlib import Path
 
 import numpy as np
@@ -134,6 +135,42 @@ def test_a_cut_last_line_is_left_out(tmp_path: Path, left: str, mark: str) -> No
     same(only(recording))
 
 
+@pytest.mark.parametrize("mark", [",", ";", "\t", " "])
+@pytest.mark.parametrize("word", ["NA", "<NA>", "N/A", "#N/A", "null", "NULL", "None", "-nan(ind)", '"NA"'])
+def test_words_for_missing_numbers(tmp_path: Path, mark: str, word: str) -> None:
+    rows = lines(mark)
+    rows[8] = mark.join([*rows[8].split(mark)[:2], word, *rows[8].split(mark)[3:]])
+    log = read(tmp_path, "\n".join(rows))
+    same(only(log), np.delete(TABLE, 7, axis=0))
+    assert "1 of 30 rows of 'a.csv' miss a number in force: row 8." in log.findings[0].message
+
+
+def test_words_that_begin_like_missing_numbers_are_none(tmp_path: Path) -> None:
+    rows = lines()
+    rows[8] = rows[8].replace(",", ",NAN2,", 1).rsplit(",", 1)[0]
+    with pytest.raises(BadFile, match=r'line 9, column "fx" holds "NAN2", which is not a number'):
+        read(tmp_path, "\n".join(rows))
+
+
+@pytest.mark.parametrize("end", ["   ", "\t", " # the end", "\n# the end", "\n  "])
+@pytest.mark.parametrize("mark", [",", " "])
+def test_a_last_line_without_its_end_that_is_whole_is_kept(tmp_path: Path, end: str, mark: str) -> None:
+    recording = read(tmp_path, "\n".join(lines(mark)) + end)
+    assert not recording.findings
+    same(only(recording))
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t", " "])
+def test_lines_of_blanks_are_no_rows(tmp_path: Path, mark: str) -> None:
+    recording = read(tmp_path, "\n   \n".join(lines(mark)))
+    assert not recording.findings
+    same(only(recording))
+
+
+def test_a_cut_last_line_below_a_preamble(tmp_path: Path) -> None:
+    same(only(read(tmp_path, "\n".join(["Rate: 100 Hz", *lines(), "0.3,1,2"]))))
+
+
 def test_a_cut_line_elsewhere_is_refused(tmp_path: Path) -> None:
     rows = lines()
     for text in ("\n".join([*rows[:9], "0.3,1,2", *rows[9:]]), "\n".join([*rows, "0.3,1,2", ""])):
@@ -214,6 +251,28 @@ def test_dates_share_an_origin_with_other_clocks(tmp_path: Path) -> None:
     np.testing.assert_allclose(first.time, second.time, atol=1e-6)
 
 
+def test_of_two_columns_of_dates_none_is_the_clock(tmp_path: Path) -> None:
+    rows = with_stamps([f"2024-05-01T12:00:00.{10 * i:03d}Z" for i in range(30)]).split("\n")
+    text = "\n".join([f"{rows[0][2:]},begun,ended", *(f"{r[r.index(',') + 1 :]},{r[:24]},{r[:24]}" for r in rows[1:])])
+    (tmp_path / "a.csv").write_text(text)
+    assert only(read_recording(tmp_path / "a.csv")).time is None
+
+
+@pytest.mark.parametrize("mark", [",", ";"])
+def test_times_of_day(tmp_path: Path, mark: str) -> None:
+    stamps = [f"09:59:59.{900 + 10 * i}" for i in range(10)] + [f"10:00:00.{10 * i:03d}" for i in range(20)]
+    text = with_stamps(stamps, mark)
+    (tmp_path / "bare.csv").write_text(text)
+    for log in (read_recording(tmp_path / "bare.csv"), read(tmp_path, text if mark == "," else text.replace(".", ","))):
+        same(only(log))
+
+
+def test_a_log_over_midnight_without_a_date_is_refused(tmp_path: Path) -> None:
+    stamps = [f"23:59:59.{970 + 10 * i}" for i in range(3)] + [f"00:00:00.{10 * i:03d}" for i in range(27)]
+    with pytest.raises(BadValue, match="time must not go back; it does once, from"):
+        read(tmp_path, with_stamps(stamps))
+
+
 def test_dates_in_a_bare_table(tmp_path: Path) -> None:
     stamps = [f"2024-05-01T12:00:00.{10 * i:03d}Z" for i in range(30)]
     (tmp_path / "a.csv").write_text(with_stamps(stamps))
@@ -263,6 +322,38 @@ def test_two_rows_of_words_are_refused(tmp_path: Path) -> None:
         read(tmp_path, "\n".join([head, units.replace("s", "1", 1), *body]))
     with pytest.raises(BadFile, match="the header has 11 names, but its rows have 12 cells"):
         read(tmp_path, "\n".join([head, units, *(f"{row};1" for row in body)]))
+
+
+@pytest.mark.parametrize(
+    ("name", "over", "said"),
+    [
+        ("t", "ms", "time: over column 0 the file says ms, and the description s. Write unit = "),
+        ("fy", "kN", "force: over column 2 the file says kN, and the description N. Write unit = "),
+        ("tz", "N·mm", "torque: over column 6 the file says N*mm, and the description N*m. Write unit = "),
+    ],
+)
+def test_a_unit_of_the_file_that_the_description_contradicts_is_refused(
+    tmp_path: Path, name: str, over: str, said: str
+) -> None:
+    head, *body = lines(";")
+    units = ";".join(over if each == name else "-" for each in NAMES)
+    called = f"{name} [{over}]"
+    for rows, toml in (
+        ([head, units, *body], TOML),
+        ([head.replace(name, called, 1), *body], TOML.replace(f'"{name}"', f'"{called}"')),
+    ):
+        (tmp_path / "a.csv").write_text("\n".join(rows))
+        (tmp_path / "log.toml").write_text(toml.format("a.csv", called if name == "t" and rows[1] != units else "t"))
+        with pytest.raises(BadInput, match=re.escape(said)):
+            read_recording(tmp_path / "log.toml")
+
+
+def test_units_of_the_file_that_the_description_repeats_or_nobody_knows_are_passed_over(tmp_path: Path) -> None:
+    head, *body = lines(";")
+    toml = TOML.format("a.csv", "t").replace('"tz"]', '"tz"], unit = "N*mm"')
+    (tmp_path / "a.csv").write_text("\n".join([head, "s;N;kp;?;Nmm;N.mm;N mm;1/s;-;-;-", *body]))
+    (tmp_path / "log.toml").write_text(toml)
+    np.testing.assert_allclose(only(read_recording(tmp_path / "log.toml")).channels["torque"], TABLE[:, 4:7] / 1e3)
 
 
 @pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "cp1252", "latin-1"])
@@ -397,3 +488,70 @@ rotation = { columns = ["q"], form = "quaternion-wxyz" }
     )
     with pytest.raises(BadFile, match="line 3 has 10 cells, the rows before it have 11"):
         read_recording(tmp_path / "log.toml")
+
+
+# --- headers --------------------
+
+NUMBERED = TOML
+for name in reversed(NAMES):
+    NUMBERED = NUMBERED.replace(f'"{name}"', str(NAMES.index(name))).replace('"{}"] }}', "0] }}")
+
+
+def numbered(folder: Path, text: str | bytes) -> Stream:
+    """Return what is read of a table without usual names, its columns told by number."""
+    (folder / "a.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    (folder / "log.toml").write_text(NUMBERED.format("a.csv"))
+    return only(read_recording(folder / "log.toml"))
+
+
+def test_columns_that_pandas_counts_in_the_header_are_no_row(tmp_path: Path) -> None:
+    same(numbered(tmp_path, "\n".join(lines(names=[str(k) for k in range(11)]))))
+
+
+def test_the_mark_of_windows_editors_in_front_of_numbers(tmp_path: Path) -> None:
+    same(numbered(tmp_path, b"\xef\xbb\xbf" + "\n".join(lines()[1:]).encode()))
+
+
+def test_a_row_that_is_commented_out_is_no_header(tmp_path: Path) -> None:
+    head, first, *body = lines()
+    same(only(read(tmp_path, "\n".join([f"# {head}", f"# {first}", *body]))), TABLE[1:])
+
+
+def test_rows_that_end_in_a_delimiter_their_header_does_not_have(tmp_path: Path) -> None:
+    head, *body = lines()
+    same(only(read(tmp_path, "\n".join([head, *(f"{row}," for row in body)]))))
+
+
+def test_quoted_names_behind_blanks(tmp_path: Path) -> None:
+    head, *body = lines()
+    same(only(read(tmp_path, "\n".join([", ".join(f'"{name}"' for name in NAMES), *body]))))
+    assert head
+
+
+def test_semicolons_within_quoted_lists_are_no_delimiter(tmp_path: Path) -> None:
+    rows = [
+        f'{r[0]:.9g},"[{";".join(f"{v:.9g}" for v in r[1:4])}]",' + ",".join(f"{v:.9g}" for v in r[4:]) for r in TABLE
+    ]
+    toml = TOML.format("a.csv", "t").replace('"fx", "fy", "fz"', '"force"')
+    (tmp_path / "a.csv").write_text("\n".join(["Rate: 100 Hz", "t,force,tx,ty,tz,qw,qx,qy,qz", *rows]))
+    (tmp_path / "log.toml").write_text(toml)
+    same(only(read_recording(tmp_path / "log.toml")))
+
+
+def test_a_number_with_underscores_is_named(tmp_path: Path) -> None:
+    rows = lines()
+    rows[3] = re.sub(",[^,]*,", ",1_000,", rows[3], count=1)
+    with pytest.raises(BadFile, match='line 4, column "fx" holds "1_000'):
+        read(tmp_path, "\n".join(rows))
+
+
+def test_a_small_file_may_unpack_to_many_times_its_size(tmp_path: Path) -> None:
+    rows = [f"{k},1,2,3,4,5,6,1,0,0,0".ljust(1000) for k in range(3000)]
+    packed = gzip.compress("\n".join([",".join(NAMES), *rows]).encode())
+    assert 1000 * len(rows) > 100 * len(packed)
+    assert len(only(read(tmp_path, packed, name="a.csv.gz"))) == len(rows)
+
+
+def test_binary_data_without_zeros_is_no_text(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match="expected a text table; found binary data"):
+        read(tmp_path, bytes(range(1, 32)) * 99)

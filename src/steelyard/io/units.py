@@ -55,6 +55,8 @@ _OTHERS: dict[str, dict[str, tuple[float, str]]] = {
 _LOOSE = re.compile("[fs]")
 
 _EARTH = (9.76, 9.84)
+# A unit in brackets behind a name; a number there is an index.
+_IN_BRACKETS = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
 # What stands between the letters of a unit, or nothing: N*m, N m, N.m, N·m, Nm; m/s^2, m/s2.
 _BETWEEN = re.compile(r"[\s*·⋅.^-]")
 
@@ -75,10 +77,16 @@ def local_g(gravity: Array) -> float:
     return size if _EARTH[0] <= size <= _EARTH[1] else STANDARD_GRAVITY
 
 
+def apart(name: str) -> tuple[str, str]:
+    """Return the name of a column and the unit in brackets behind it, "" where there is none: "Fx [N]"."""
+    found = _IN_BRACKETS.search(name)
+    return (name[: found.start()], found.group(1)) if found else (name, "")
+
+
 def spelled(quantity: str, unit: str) -> str:
     """Return the unit of a quantity as it is spelled here: "Nm", "N m" and "N·m" are "N*m". Unknown ones stay."""
     letters = _letters(unit)
-    return next((known for known in UNITS[quantity] if _letters(known) == letters), unit)
+    return next((known for known in UNITS.get(quantity, ()) if _letters(known) == letters), unit)
 
 
 def instead(quantity: str, unit: str) -> str:

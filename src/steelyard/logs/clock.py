@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -24,9 +26,18 @@ def seconds(time: ArrayLike) -> Array:
     return check.finite("time", np.where(np.isnat(stamps), np.nan, counts * 1e-9))
 
 
+def usual_step(steps: np.ndarray[Any, np.dtype[Any]]) -> float:
+    """Return how far rows are apart by steps (N-1,), not all zero: of a coarse clock, many rows share a stamp."""
+    usual = float(np.median(steps))
+    if usual > 0:
+        return usual
+    ticks = steps[steps > 0]
+    return float(np.median(ticks)) * len(ticks) / len(steps)
+
+
 def median_step(time: Array) -> float:
-    """Return the median step [s] of a clock (N,), of two stamps or more."""
-    return float(np.median(np.diff(time)))
+    """Return the usual step [s] of a clock (N,), of two stamps or more that are not all one."""
+    return usual_step(np.diff(time))
 
 
 def sampling_rate(time: Array) -> float:

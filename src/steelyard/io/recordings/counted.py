@@ -43,7 +43,9 @@ def part_names(table: Table, runs: Mapping[str, tuple[int, ...]]) -> dict[str, i
     """Return usual names for the parts of counted columns: force_0 -> force_x .., wrench_3 -> wrench_torque_x."""
     out: dict[str, int] = {}
     for name, run in runs.items():
-        simple = name.removesuffix("_sensor").removesuffix("_world")
+        simple = name.removesuffix("_sensor")
+        if "position" in simple:  # which is in W anyway; a force in the axes of W is none in those of S
+            simple = simple.removesuffix("_world")
         if len(run) == 3:
             out |= dict(zip(_vector(simple), run, strict=True))
         elif len(run) == 6 and any(f"_{simple}".endswith(f"_{wrench}") for wrench in _WRENCHES):

@@ -1,11 +1,11 @@
 """A bare data file becomes a description when its column names are the usual ones.
 
-A unit in brackets is taken; a vector whose meaning its numbers leave open (gx may be a gyro) is left out.
+A unit in brackets is taken, or in a row under the header; a vector whose meaning its numbers leave open (gx may be a
+gyro) is left out.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,11 +21,12 @@ from steelyard.io.streams.channels import channel_with_gaps, stand_apart
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.streams.usual_names import STEMS, Names, compared
 from steelyard.io.tables.files import Columns, Table
-from steelyard.io.units import SLOWEST, UNITS, converted, median_size, stamp_unit, unit_by_size
+from steelyard.io.units import SLOWEST, UNITS, apart, converted, median_size, stamp_unit, unit_by_size
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
-_UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
+_NO_UNIT = {"", "-", "–"}  # what a row of units holds where there is none
 
+# Half and twice as much do as well: logs turn by a degree or two from row to row, tables of poses by twenty and more.
 _NEW_POSE = float(np.cos(np.radians(5)))
 
 
@@ -98,13 +99,16 @@ def _simplified(table: Table) -> Names:
         raise cannot_tell(table, "the file has no header", numbered_lines(table))
     plain: dict[str, int] = {}
     units: dict[int, str] = {}
-    inner = {n for group in header.groups.values() for n in group}
+    inner = {n for group in header.groups.values() if len(group) > 1 for n in group}
+    alone = {group[0]: name for name, group in header.groups.items() if len(group) == 1}  # (N, 1), as MATLAB has them
     for number, name in enumerate(header.names):
-        unit = None if number in inner else _UNIT.search(name)
-        if unit:
-            units[number] = unit.group(1)
-        simple = compared(name[: unit.start()] if unit else name)
-        if simple in plain:
+        name = alone.get(number, name)
+        plain_name, unit = (name, "") if number in inner else apart(name)
+        unit = unit or header.unit(number)
+        if unit not in _NO_UNIT:
+            units[number] = unit
+        simple = compared(plain_name)
+        if simple and simple in plain:
             known = Names(plain, units, header.dates, header.words)
             raise cannot_tell(table, f'two columns are called "{simple}"', own_lines(table, known))
         plain[simple] = number

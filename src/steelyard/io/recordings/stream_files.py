@@ -15,12 +15,18 @@ from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io.entries import listed
+from steelyard.io.rotations import ANGULAR
 from steelyard.io.streams.channels import channel_with_gaps, require_one_length
 from steelyard.io.streams.clocks import Clock, common_origin, one_column
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec
 from steelyard.io.tables.files import TEXT, Columns, Table, choose_columns, find_file
+from steelyard.io.units import ANGLE, TIME, UNITS, spelled
 from steelyard.logs.recording import Stream
 
+# Units that may stand over a column, by what it holds; of rotations by their form.
+_KNOWN = {what: tuple(units) for what, units in {**UNITS, **dict.fromkeys(ANGULAR, ANGLE)}.items()} | {
+    "time": tuple(TIME)
+}
 _KINDS = ".csv, .tsv, .txt (also .gz), .npz, .parquet, and bags: .mcap, .db3, .bag"
 
 
@@ -73,6 +79,7 @@ def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Col
     for spec, table in zip(specs, tables, strict=True):
         stamps = time_columns(spec, table)
         own.append({*_chosen(spec, table, stamps), *stamps})
+        _require_units_of_file(spec, table, stamps)
         wanted.setdefault(id(table), set()).update(own[-1])
         exact.setdefault(id(table), set()).update(stamps)
     cells: dict[int, Columns] = {}
@@ -98,6 +105,21 @@ def _chosen(spec: StreamSpec, table: Table, stamps: Sequence[int]) -> list[int]:
             user[n] = quantity.name
             chosen.append(n)
     return chosen
+
+
+def _require_units_of_file(spec: StreamSpec, table: Table, stamps: Sequence[int]) -> None:
+    """Raise BadDescription where a column's name, or a row of units, says another unit than the description."""
+    time = spec.time
+    told = [("time", time.where, n, unit) for n, unit in zip(stamps, time.units, strict=False)] if time else []
+    for q in spec.quantities:
+        told += [(q.form or q.name, q.where, n, q.unit) for n in _numbers(q, table)]
+    for what, where, n, unit in told:
+        said = spelled(what, table.header.unit(n))
+        if said in _KNOWN.get(what, ()) and said != unit and n not in table.header.dates:
+            raise BadDescription(
+                f'{where}: over column {n} the file says {said}, and the description {unit}. Write unit = "{said}", or '
+                "correct the file."
+            )
 
 
 def _numbers(spec: QuantitySpec, table: Table) -> tuple[int, ...]:
@@ -143,7 +165,7 @@ def _channels(spec: StreamSpec, table: Table, cells: Columns, gravity: Array) ->
         columns = [cells[n].astype(np.float64, copy=False) for n in _numbers(quantity, table)]
         values = channel_with_gaps(quantity, columns, gravity)
         out[quantity.name] = values
-        if quantity.name in ("force", "torque") and len(values) > 1 and not np.nan_to_num(values).any():
+        if quantity.name in ("force", "torque") and len(values) and not np.nan_to_num(values).any():
             passive = ' or say torque = "zero" if the wrist passes no moment' if quantity.name == "torque" else ""
             raise BadValue(
                 f"{spec.where}: {quantity.name} is zero in every row. Give the columns that hold it{passive}."

@@ -17,6 +17,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.streams.channels import require_finite, unfit_text
 from steelyard.io.units import TIME
+from steelyard.logs.clock import usual_step
 
 _FEW_STEPS = 10
 # Signals are put on even stamps: a clock that was set in the middle of a log would make them fill the memory.
@@ -85,7 +86,7 @@ class Clock:
             )
         if len(steps) > _FEW_STEPS:
             self._refuse_days()
-            step = _usual_step(steps) / self.per_second
+            step = usual_step(steps) / self.per_second
             check.likely_step(step, self.where)
             self._refuse_jumps(steps, step)
 
@@ -127,7 +128,7 @@ def _counted_on(stamps: np.ndarray[Any, np.dtype[Any]], per_second: int) -> np.n
     falls = steps < 0
     if not falls.any() or not (steps > 0).any():
         return stamps
-    near = _WITHIN_STEPS * _usual_step(steps[~falls])
+    near = _WITHIN_STEPS * usual_step(steps[~falls])
     for bits, counts in product(_BITS, _COUNTS):
         period = 2**bits * per_second / counts
         last, first = stamps[:-1][falls], stamps[1:][falls]
@@ -140,15 +141,6 @@ def _counted_on(stamps: np.ndarray[Any, np.dtype[Any]], per_second: int) -> np.n
             whole = int(period) if stamps.dtype.kind == "i" and period.is_integer() else period
             return np.asarray(stamps + whole * np.concatenate([[0], np.cumsum(falls)]))
     return stamps
-
-
-def _usual_step(steps: np.ndarray[Any, np.dtype[Any]]) -> float:
-    """Return how far rows are apart by steps (N-1,), not all zero: of a coarse clock, many rows share a stamp."""
-    usual = float(np.median(steps))
-    if usual > 0:
-        return usual
-    ticks = steps[steps > 0]
-    return float(np.median(ticks)) * len(ticks) / len(steps)
 
 
 def common_origin(clocks: Sequence[Clock]) -> int:

@@ -126,7 +126,7 @@ class Names:
 
     def said_unit(self, number: int) -> str | None:
         """Return the unit of time that a name carries: t_ms, t [ms]."""
-        name = next(key for key, n in self.plain.items() if n == number)
+        name = next((key for key, n in self.plain.items() if n == number), "")
         return next((said for said in (self.units.get(number, ""), name.rpartition("_")[2]) if said in TIME), None)
 
     def of_controllers(self) -> Iterator[tuple[str, tuple[int, ...], str, str]]:

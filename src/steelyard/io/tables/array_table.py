@@ -25,6 +25,7 @@ from steelyard.io.tables.files import Columns, Header
 
 _WIDEST = 4096
 _MOST_COLUMNS = 65_536
+_NUMBERS = "fiub"  # kinds of dtype
 _PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of numpy
 # What reading an array of a damaged NPZ raises, and what Python's parser does at the text of its header.
 _DAMAGED = (ValueError, TypeError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
@@ -68,14 +69,18 @@ class ArrayTable:
         return cls(path, Header(tuple(names), len(names), groups, shapes=shapes), tuple(sources))
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
-        """Return columns by number; raises BadFile where an array is damaged or not of numbers."""
+        """Return columns by number, dates in `exact` as datetime64[ns]; raises BadFile where an array is damaged or not
+        of numbers."""
         out: Columns = {}
-        arrays = read_numbers(self.path, list(dict.fromkeys(self.sources[number][0] for number in columns)))
+        arrays = read_arrays(self.path, list(dict.fromkeys(self.sources[number][0] for number in columns)))
+        stamps = {self.sources[number][0] for number in exact}
+        for key, array in arrays.items():
+            _require_numbers(self.path, key, array, f"{_NUMBERS}M" if key in stamps else _NUMBERS)
         for number in columns:
             key, inner = self.sources[number]
             column = arrays[key].reshape(len(arrays[key]), math.prod(arrays[key].shape[1:]))[:, inner]
-            keep = number in exact and column.dtype.kind in "iu"
-            out[number] = column.astype(np.int64 if keep else np.float64)
+            kind = column.dtype.kind if number in exact else "f"
+            out[number] = column.astype({"i": np.int64, "u": np.int64, "M": "M8[ns]"}.get(kind, np.float64))
         return out
 
 
@@ -83,9 +88,13 @@ def read_numbers(path: Path, names: Sequence[str]) -> dict[str, Any]:
     """Return named arrays of an NPZ file; raises BadFile where one is missing, damaged or not of real numbers."""
     found = read_arrays(path, names)
     for name, array in found.items():
-        if array.dtype.kind not in "fiub":
-            raise BadFile(f'{path}: array "{name}" must hold real numbers; it holds {array.dtype}.')
+        _require_numbers(path, name, array)
     return found
+
+
+def _require_numbers(path: Path, name: str, array: Any, kinds: str = _NUMBERS) -> None:
+    if array.dtype.kind not in kinds:
+        raise BadFile(f'{path}: array "{name}" must hold real numbers; it holds {array.dtype}.')
 
 
 def read_arrays(path: Path, names: Sequence[str] = (), of: str = "It needs", most: int | None = None) -> dict[str, Any]:

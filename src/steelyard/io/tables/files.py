@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard.errors import BadDescription, BadFile
 from steelyard.io.entries import close_match, listed
+from steelyard.io.units import apart
 
 Column = str | int  # as a description names one
 Columns = dict[int, np.ndarray[Any, np.dtype[Any]]]
@@ -28,6 +29,7 @@ class Header:
     groups  arrays with several columns (NPZ, lists in cells): name -> its column numbers
     dates   numbers of the columns of a text that hold dates
     words   numbers of the columns of a text that hold neither numbers nor dates
+    units   words of a row of units under the header, one per column; none where there is no such row
     shapes  shape of every array of an NPZ, also of those that are no columns
     """
 
@@ -36,7 +38,14 @@ class Header:
     groups: dict[str, tuple[int, ...]] = field(default_factory=dict)
     dates: tuple[int, ...] = ()
     words: tuple[int, ...] = ()
+    units: tuple[str, ...] = ()
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
+
+    def unit(self, column: int) -> str:
+        """Return the unit over a column, in brackets behind its name or in a row of units; "" where there is none."""
+        if self.names is None or any(column in group for group in self.groups.values()):
+            return ""
+        return apart(self.names[column])[1] or (self.units[column].strip("[]() ") if self.units else "")
 
     def shown(self) -> list[str]:
         """Return the names to list in a message: arrays with several columns appear once."""

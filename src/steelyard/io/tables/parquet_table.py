@@ -25,7 +25,7 @@ def _pyarrow() -> tuple[Any, Any]:
 
 @dataclass(frozen=True)
 class ParquetTable:
-    """A Parquet file; stamps of a timestamp type count in that type's own unit since 1970."""
+    """A Parquet file; stamps of a timestamp type are dates, whatever unit that type counts in."""
 
     path: Path
     header: Header
@@ -35,13 +35,15 @@ class ParquetTable:
         """Read the schema only; raises BadFile or MissingDependency."""
         arrow, parquet = _pyarrow()
         try:
-            names = tuple(parquet.read_schema(path).names)
+            schema = parquet.read_schema(path)
         except (arrow.ArrowException, OSError):
             raise BadFile(f"{path}: expected a Parquet file; found something else.") from None
-        return cls(path, Header(names, len(names), {}))
+        names = tuple(schema.names)
+        dates = tuple(n for n, name in enumerate(names) if arrow.types.is_timestamp(schema.field(name).type))
+        return cls(path, Header(names, len(names), dates=dates))
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
-        """Return columns by number; nulls become NaN. Raises BadFile where a column is not of numbers."""
+        """Return columns by number; nulls become NaN, dates in `exact` datetime64[ns]. Raises BadFile."""
         arrow, parquet = _pyarrow()
         names = self.header.names or ()
         wanted = sorted({names[n] for n in columns})
@@ -66,6 +68,8 @@ class ParquetTable:
     def _column(arrow: Any, column: Any, exact: bool) -> np.ndarray[Any, np.dtype[Any]]:
         kind = column.type
         if arrow.types.is_timestamp(kind):
+            if exact:
+                return np.asarray(column.cast(arrow.timestamp("ns"), safe=False).to_numpy(), dtype="M8[ns]")
             column, kind = column.cast(arrow.int64()), arrow.int64()
         if arrow.types.is_decimal(kind):
             column, kind = column.cast(arrow.float64()), arrow.float64()

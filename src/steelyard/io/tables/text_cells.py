@@ -1,7 +1,8 @@
 """What a cell of a text table may be, and blocks of such cells made plain for numpy's reader.
 
-A cell is a number, nothing, a stamp as ISO 8601, or, between semicolons or tabs, a number with a decimal comma. It may
-hold a list of numbers, as pandas writes columns of arrays: "[0.1, 0.2]" becomes cells of their own.
+A cell is a number, nothing or a word for it (NA, null), a stamp as ISO 8601 or a time of day, or, between semicolons or
+tabs, a number with a decimal comma. It may hold a list of numbers, as pandas writes columns of arrays: "[0.1, 0.2]"
+becomes cells of their own.
 """
 
 from __future__ import annotations
@@ -21,12 +22,19 @@ _WORDS = re.compile(r'"[^"]*"|\S+')
 _EXPONENT = r"(?:[eE][+-]?\d+)?"
 _DECIMAL_COMMA = re.compile(rf"[+-]?\d*,\d+{_EXPONENT}")
 _DECIMAL_POINT = re.compile(rf"[+-]?(?:\d+\.\d*|\.\d+){_EXPONENT}")
-_STAMP_FORM = r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:[.,]\d{1,9})?(?:Z|[+-]\d\d:?\d\d)?"
-_STAMP = re.compile(_STAMP_FORM)
+_TIME_OF_DAY = r"\d\d:\d\d:\d\d(?:[.,]\d{1,9})?"
+_STAMP_FORM = rf"\d{{4}}-\d\d-\d\d[T ]{_TIME_OF_DAY}(?:Z|[+-]\d\d:?\d\d)?"
+_STAMP = re.compile(f"{_STAMP_FORM}|{_TIME_OF_DAY}")
 _STAMPS = re.compile(rf"(?:(?:{_STAMP_FORM}|nan)\n)*")
+_TIMES = re.compile(rf"(?:(?:{_TIME_OF_DAY}|nan)\n)*")
+_NO_DAY = re.compile(r"^(?=\d)", re.MULTILINE)
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}\b.*|\d{1,2}:\d\d\b.*")
 # What a decimal point becomes where commas are the decimals: 1.234,5 or 1.234 may mean thousands, so is no number.
 _NO_POINT = "\x01"  # binary, so in no text
+
+# What R, pandas, SQL, spreadsheets and the C library of Windows write where a number is missing.
+_MISSING = re.compile(r'(?<![^\s,;"])(?:NA|<NA>|N/A|n/a|#N/A|NULL|null|None|-?nan\(ind\))(?![^\s,;"])')
+_BLANK = re.compile("^ ++$", re.MULTILINE)
 
 # Numbers between brackets, in quotes where the delimiter may stand among them; matrices are lists of lists.
 _LIST = re.compile(r'"\s*(\[[^"]*\])\s*"|(\[[^"\[\];\t]*\])')
@@ -58,7 +66,7 @@ def is_number(cell: str) -> bool:
 
 
 def is_stamp(cell: str) -> bool:
-    """Whether the cell is a date with a time of day as ISO 8601."""
+    """Whether the cell is a date with a time of day as ISO 8601, or a time of day alone."""
     return _STAMP.fullmatch(cell) is not None
 
 
@@ -111,7 +119,8 @@ def with_commas(cell: str) -> str:
 
 
 def filled(block: str, delimiter: str | None) -> str:
-    """Return a block with nan in its empty cells."""
+    """Return a block with nan in cells that are empty or hold a word for it, and nothing in lines of blanks."""
+    block = _BLANK.sub("", _MISSING.sub("nan", block))
     if delimiter is None:
         return block
     mark = re.escape(delimiter)
@@ -132,7 +141,7 @@ def completed(block: str, delimiter: str | None, first: Sequence[str]) -> str:
         return block
     cells = line.split() if delimiter is None else line.split(delimiter)
     last = cells[-1].strip().strip('"')
-    half = last and not _is_datum(last, delimiter) and _is_datum(first[-1], delimiter)
+    half = last and not _is_datum(last, delimiter)  # of a column of words, which nobody reads, no matter
     if len(cells) > len(first) or (len(cells) == len(first) and not half):
         return block
     mark = " " if delimiter is None else delimiter
@@ -145,7 +154,9 @@ def stamps_of(cells: np.ndarray[Any, np.dtype[Any]]) -> np.ndarray[Any, np.dtype
     Without a zone they are taken as they stand: only their differences count.
     """
     text = "\n".join([*cells.tolist(), ""]).replace(_NO_POINT, ".").replace(",", ".")
-    if not _STAMPS.fullmatch(text):
+    if _TIMES.fullmatch(text):  # all of one day: only their differences count
+        text = _NO_DAY.sub("1970-01-01T", text)
+    elif not _STAMPS.fullmatch(text):
         raise BadValue("a stamp is of another form")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # numpy turns zones into UTC, and says that it keeps none

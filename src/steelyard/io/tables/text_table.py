@@ -85,9 +85,9 @@ class TextTable:
             return cls(path, Header(names, len(cells), words=_words(cells, delimiter)), delimiter, rows[0], cells)
         if len(rows) < 2:
             raise BadFile(f"{path}: the file has a header but no rows. Record again, or correct the path.")
-        skip, first = rows[0] + 1, split(lines[rows[1]], delimiter)
+        skip, first, units = rows[0] + 1, split(lines[rows[1]], delimiter), tuple[str, ...]()
         if len(rows) > 2 and are_words(first, delimiter) and are_data(split(lines[rows[2]], delimiter), delimiter):
-            skip, first = rows[1] + 1, split(lines[rows[2]], delimiter)  # a row of units stood between them
+            skip, first, units = rows[1] + 1, split(lines[rows[2]], delimiter), first
         if len(first) != len(cells) and not (len(first) == len(cells) + 1 and not first[-1]):
             raise BadFile(
                 f"{path}: the header has {len(cells)} names, but its rows have {len(first)} cells. "
@@ -98,7 +98,8 @@ class TextTable:
         if groups:
             first = split(spread(lines[skip], delimiter), delimiter)
         dates = tuple(n for n, cell in enumerate(first) if is_stamp(cell))
-        header = Header(names, len(names), groups, dates, _words(first, delimiter))
+        units = units if len(units) == len(names) else ()
+        header = Header(names, len(names), groups, dates, _words(first, delimiter), units)
         return cls(path, header, delimiter, skip, first, bool(groups))
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
@@ -241,4 +242,4 @@ def _comment_header(lines: list[str], delimiter: str | None, count: int) -> tupl
 def _counted(cells: Sequence[str]) -> bool:
     """Whether the cells are 0, 1, 2, ..: the header that pandas writes for columns without names."""
     named = [cell for cell in cells if cell]
-    return (len(named) > 2 or not cells[0]) and named == [str(i) for i in range(len(named))]
+    return len(named) > 2 and named == [str(i) for i in range(len(named))]
