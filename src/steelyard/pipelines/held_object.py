@@ -18,7 +18,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import KNOWN_PLACE, Recording
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.load import Load, looked_at, placed
-from steelyard.pipelines.looking_back import looked_back, of_sensor_and_body, pulled, room_allowed
+from steelyard.pipelines.looking_back import corrections_allowed, looked_back, of_sensor_and_body, pulled
 from steelyard.pipelines.options import DEFAULTS, DRIFT_ALLOWED, Options
 from steelyard.pipelines.rows import rows_as_given
 from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, sign_found, told, uncalibrated
@@ -57,7 +57,7 @@ def identify(
     with beside(before, rows.log.gravity):
         load, estimate = load.followed()
     load, estimate, late = looked_back(load, estimate, rows, recording, before)
-    estimate = room_allowed(load, estimate, rows)
+    estimate = corrections_allowed(load, estimate, rows)
     estimate = load.without_tool(estimate).noted(*rows.notes, *[f"{DRIFT_ALLOWED}, as asked"] * options.drift)
     estimate = estimate if rows.place is None else rows.place.widened(estimate)
     estimate = estimate if rows.maybe is None else rows.maybe.allowed(estimate)

@@ -10,6 +10,7 @@ from steelyard.identify.room_bias import without
 from steelyard.identify.scale import allow_scale
 from steelyard.identify.tool import shares_bias
 from steelyard.logs.alignment import Aligned
+from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.load import Load
 from steelyard.pipelines.options import DRIFT_ALLOWED
@@ -55,18 +56,21 @@ def looked_back(
     return load, estimate, late
 
 
-def room_allowed(load: Load, estimate: Estimate, rows: FitRows) -> Estimate:
-    """Return the estimate with bars that hold how well a bias that keeps its direction in the room, and gravity's own
-    direction where that was estimated, are known."""
+def corrections_allowed(load: Load, estimate: Estimate, rows: FitRows) -> Estimate:
+    """Return the estimate with bars that hold how well that is known which the rows are without: a bias that keeps its
+    direction in the room, play of the sensor, and gravity's own direction where that was estimated.
+
+    How a sensor's loop runs between its turns no log tells: bars hold all that its play moves the answer by.
+    """
     log, rotation = load.log, rotation_of(load.log, rows.aligned)
-    if rotation is None:
-        return estimate
-    biases = () if rows.room is None else rows.room.bias.errors()
-    pulls = () if rows.level is None else rows.level.within
-    others = [
-        *(without(error, log, rotation) for error in biases),
-        *(levelled(log, rotation, gravity, rows.aligned.acceleration_from) for gravity in pulls),
-    ]
+    others: list[MotionLog] = []
+    if rows.play is not None:
+        others.append(rows.play.back(log))
+    if rotation is not None:
+        biases = () if rows.room is None else rows.room.bias.errors()
+        pulls = () if rows.level is None else rows.level.within
+        others += [without(error, log, rotation) for error in biases]
+        others += [levelled(log, rotation, gravity, rows.aligned.acceleration_from) for gravity in pulls]
     return estimate.allowing(*(load.of(other).parameters.vector - estimate.parameters.vector for other in others))
 
 

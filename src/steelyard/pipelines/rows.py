@@ -29,6 +29,7 @@ from steelyard.sanity.fitted.biases import SeenRoomBias, examine_room_bias
 from steelyard.sanity.fitted.full_fit import force_left
 from steelyard.sanity.fitted.gravity import FittedGravity, fitted_gravity, levelled
 from steelyard.sanity.fitted.misplaced import Misplaced, examine_place, misplaced, of_sensor
+from steelyard.sanity.fitted.play import Play, lasts, play
 from steelyard.sanity.fitted.sensor_matrix import turn_of
 from steelyard.sanity.holding.consensus import FINE
 from steelyard.sanity.holding.contact import agreeing
@@ -47,6 +48,8 @@ UNLIKE_ONE_BODY = {"motion-mismatch", "weight-compensated"}
 Spans = tuple[tuple[float, float], ...]
 # So often clocks are found anew without the time of a hand.
 HANDS = 2
+# So often play of the sensor is found, with clocks anew.
+PLAYS = 8
 # A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where a part
 # of the log, no smaller than that, leaves less than so much of it. Where one was found, clocks without it may leave so
 # many times as much.
@@ -66,6 +69,7 @@ class FitRows:
     place       the point whose positions the recording has, where it is not the origin of S
     maybe       the same where that is not beyond doubt: the rows are those of the origin
     room        a bias that keeps its direction in the room, which the rows are without
+    play        play of the sensor, which the rows are without
     units       findings that forces and torques do not belong together, where such a point would be no point
     """
 
@@ -79,6 +83,7 @@ class FitRows:
     maybe: Misplaced | None = None
     units: tuple[Finding, ...] = ()
     room: SeenRoomBias | None = None
+    play: Play | None = None
 
     @property
     def kept(self) -> float:
@@ -134,6 +139,44 @@ class Reading:
         if rows.delayed and (turn := turn_of(rows.log, self.recording, self.before, drift)) is not None:
             rows = replace(self._rows(replace(how, turn=turn)), place=rows.place, maybe=rows.maybe)
         return rows
+
+    def without_play(self) -> tuple[Recording, FitRows]:
+        """Return recording and rows without play of the sensor, with delays that it passed for found anew."""
+        rows, drift = self.rows_to_fit(), self.options.drift
+        found = self._play(rows)
+        steps: list[Array] = []
+        for _ in range(PLAYS):
+            if found is None:
+                break
+            right = replace(self, recording=found.put_right(self.recording))
+            again = right.rows_to_fit()
+            last, log = found, found.back(again.log)
+            found = play(log, last.back(again.aligned.log), self.recording, drift)
+            if found is None:
+                break
+            if found.like(last):
+                sure = found.explains(log, lasts(rows.log, drift), drift)
+                return (right.recording, replace(again, play=found)) if sure else (self.recording, rows)
+            steps = [*steps[-1:], found.half - last.half]
+            if len(steps) == 2:
+                # Delays and play are found by turns, and what one takes for the other goes by the same share each time.
+                found, steps = found.moved(*steps), []
+        return self.recording, rows
+
+    def _play(self, rows: FitRows) -> Play | None:
+        """Return the play that rows may show, or the same rows with clocks as stamped: play passes for a delay."""
+        drift, recording = self.options.drift, self.recording
+        if rows.unmeasured or self.left_in or stands_aside("room bias", self.before):
+            return None
+        found = play(rows.log, rows.aligned.log, recording, drift)
+        if found is None or not found.shows:
+            return None
+        maybe: list[Play | None] = [found]
+        if any(rows.aligned.delays_std_s.values()):
+            stamped, _ = self._aligned(AlignOptions(estimate_delays=False))
+            held = self._held(FitRows(stamped.log, stamped, None, (), ()))
+            maybe.append(play(held.log, stamped.log, recording, drift))
+        return min((one for one in maybe if one is not None), key=lambda one: one.slowly)
 
     def _placed(self, place: Misplaced) -> tuple[FitRows, AlignOptions]:
         """Return the rows with accelerations of S, where they were of another point, and how they were aligned.
@@ -246,7 +289,7 @@ def rows_as_given(
 
     gravity  (3,) [m/s^2] in W as given, before the recording was examined
     """
-    rows = Reading(recording, before, options).rows_to_fit()
+    recording, rows = Reading(recording, before, options).without_play()
     if "base-tilted" not in codes(before):
         return recording, before, rows
     level = replace(recording, gravity=gravity)

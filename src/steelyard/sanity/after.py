@@ -17,11 +17,14 @@ from steelyard.sanity.coverage import coverage
 from steelyard.sanity.fitted.biases import Drift
 from steelyard.sanity.fitted.gravity import fitted_gravity
 from steelyard.sanity.fitted.no_body import implausible
+from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
 
 # chi^2 per degree of freedom above this, and declared noise off by this factor, are far from right.
 CHI2, NOISE_RATIO = 2.5, 2.5
 # A tilt counts beyond 2 degrees and four standard deviations, where it takes 30 % of the squared residual away.
 TILT, SURE, TILT_SHARE = np.radians(2.0), 4.0, 0.7
+# It is none where a turned sensor, or unlike gains, leave less than this share of what it leaves.
+CLEARER = 0.5
 # The prior dominates where it brings a standard deviation below half of what the data alone give.
 PRIOR_SHARE = 0.5
 # Rows come 2.5 times as often as the low-pass has Hz, which leaves this share of white noise up to half their rate.
@@ -52,6 +55,9 @@ def _base_tilted(log: MotionLog, aligned: Aligned, gravity: Array) -> tuple[Find
     rotation = rotation_of(log, aligned)
     found = None if rotation is None else fitted_gravity(log, rotation, gravity, aligned.acceleration_from)
     if found is None or found.angle <= max(TILT, SURE * found.angle_std) or found.left >= TILT_SHARE:
+        return ()
+    sensor = sensor_matrix(log)
+    if sensor is not None and sensor.left < CLEARER * found.left:
         return ()
     message = (
         f"Gravity fits {found.words} off the direction given, with {100 * (1 - found.left):.0f} % less squared "
