@@ -48,8 +48,9 @@ UNLIKE_ONE_BODY = {"motion-mismatch", "weight-compensated"}
 Spans = tuple[tuple[float, float], ...]
 # So often clocks are found anew without the time of a hand.
 HANDS = 2
-# So often play of the sensor is found, with clocks anew.
-PLAYS = 8
+# So often play of the sensor is found, with clocks anew, where it leaves less than the second share of what lasts a
+# second, and less than the first beside the delays that were found.
+PLAYS, HINT, MAYBE = 8, 0.96, 0.8
 # A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where a part
 # of the log, no smaller than that, leaves less than so much of it. Where one was found, clocks without it may leave so
 # many times as much.
@@ -142,22 +143,27 @@ class Reading:
 
     def without_play(self) -> tuple[Recording, FitRows]:
         """Return recording and rows without play of the sensor, with delays that it passed for found anew."""
-        rows, drift = self.rows_to_fit(), self.options.drift
-        found = self._play(rows)
-        steps: list[Array] = []
+        rows = self.rows_to_fit()
+        try:
+            found = self._play(rows)
+            return (self.recording, rows) if found is None else self._by_turns(rows, found)
+        except CannotAnswer:  # with other clocks, or without such play, too little is left: there is none
+            return self.recording, rows
+
+    def _by_turns(self, rows: FitRows, found: Play) -> tuple[Recording, FitRows]:
+        """Return recording and rows without play, sought from `found` on by turns with delays; else as they are."""
+        drift, steps = self.options.drift, list[Array]()
         for _ in range(PLAYS):
-            if found is None:
-                break
             right = replace(self, recording=found.put_right(self.recording))
             again = right.rows_to_fit()
-            last, log = found, found.back(again.log)
-            found = play(log, last.back(again.aligned.log), self.recording, drift)
-            if found is None:
+            log = found.back(again.log)
+            now = play(log, found.back(again.aligned.log), self.recording, drift)
+            if now is None:
                 break
-            if found.like(last):
-                sure = found.explains(log, lasts(rows.log, drift), drift)
-                return (right.recording, replace(again, play=found)) if sure else (self.recording, rows)
-            steps = [*steps[-1:], found.half - last.half]
+            if now.like(found):
+                sure = now.explains(log, lasts(rows.log, drift), drift)
+                return (right.recording, replace(again, play=now)) if sure else (self.recording, rows)
+            steps, found = [*steps[-1:], now.half - found.half], now
             if len(steps) == 2:
                 # Delays and play are found by turns, and what one takes for the other goes by the same share each time.
                 found, steps = found.moved(*steps), []
@@ -168,15 +174,15 @@ class Reading:
         drift, recording = self.options.drift, self.recording
         if rows.unmeasured or self.left_in or stands_aside("room bias", self.before):
             return None
-        found = play(rows.log, rows.aligned.log, recording, drift)
-        if found is None or not found.shows:
+        found, slow = play(rows.log, rows.aligned.log, recording, drift), lasts(rows.log, drift)
+        if found is None or not found.shows or found.slowly > HINT * slow:
             return None
-        maybe: list[Play | None] = [found]
         if any(rows.aligned.delays_std_s.values()):
             stamped, _ = self._aligned(AlignOptions(estimate_delays=False))
             held = self._held(FitRows(stamped.log, stamped, None, (), ()))
-            maybe.append(play(held.log, stamped.log, recording, drift))
-        return min((one for one in maybe if one is not None), key=lambda one: one.slowly)
+            other = play(held.log, stamped.log, recording, drift)
+            found = found if other is None else min(found, other, key=lambda one: one.slowly)
+        return found if found.slowly < MAYBE * slow else None
 
     def _placed(self, place: Misplaced) -> tuple[FitRows, AlignOptions]:
         """Return the rows with accelerations of S, where they were of another point, and how they were aligned.
