@@ -20,6 +20,11 @@ def direction_words(vector: Array) -> str:
     return _listed(vector / np.linalg.norm(vector), 3)
 
 
+def shortly(vector: Array) -> str:
+    """Return numbers (N,) with two figures each."""
+    return ", ".join(f"{v:.2g}" for v in vector)
+
+
 def unexplained(left: float, before: float, of: str = "their") -> str:
     """Say what share of the variance `of` something another reading leaves, beside what is left as given."""
     return f"{percent(left)} of {of} variance is left unexplained instead of {percent(before)}"

@@ -16,6 +16,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.fitted.misplaced import misplaced
 from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
+from steelyard.sanity.words import shortly
 
 # A drift counts beyond 2 % of the weight (at 0.1 m for torques), where it takes 20 % of the squared residual away.
 DRIFT_WEIGHT, DRIFT_ARM, DRIFT_SHARE = 0.02, 0.1, 0.8
@@ -125,7 +126,7 @@ class SeenRoomBias:
         upward = float(np.sqrt(self.up @ self.bias.covariance[3:, 3:] @ self.up))
         text = (
             "The wrench has a bias that keeps its direction in the room, as where a controller zeroes it in the axes "
-            f"of its base: force ({_numbers(force)}) N and torque ({_numbers(torque)}) N m along x, y, z of W. The "
+            f"of its base: force ({shortly(force)}) N and torque ({shortly(torque)}) N m along x, y, z of W. The "
             f"answer is without it. Poses do not tell its force along gravity from weight: {upward:.2g} N "
             "of doubt are in the bar of the mass."
         )
@@ -211,7 +212,3 @@ def room_fit(log: MotionLog, rotation: Array, gravity: Array, drift: bool) -> Ro
     others = sensor_matrix(log, drift), misplaced(log, drift)
     best = all(other is None or left < other.left for other in others)
     return RoomFit(force, std, times, slowly / slow, slowly / max(tilted, 1e-300), best)
-
-
-def _numbers(vector: Array) -> str:
-    return ", ".join(f"{v:.2g}" for v in vector)

@@ -20,6 +20,7 @@ from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.fitted.misplaced import misplaced
 from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
+from steelyard.sanity.words import shortly
 from steelyard.spatial import cross_matrix
 
 # Half widths are sought from this share of a channel's range on, and fitted anew so often.
@@ -115,8 +116,8 @@ class Play:
         torque, force = np.split(self.width, 2)
         text = (
             "The sensor's offset hangs on which way its load last went, as with hysteresis or play: half widths of "
-            f"{_numbers(force)} N and {_numbers(torque)} N m along its x, y, z. The answer is without it, and its bars "
-            "hold all that it did."
+            f"{shortly(force)} N and {shortly(torque)} N m along its x, y, z. The answer is without it, and its "
+            "bars hold all that it did."
         )
         return Finding("bias-drift", text, REMEDY)
 
@@ -177,7 +178,3 @@ def _behind(load, half):  # type: ignore[no-untyped-def]  # pragma: no cover - c
             read = min(max(read, load[k, c] - half[c]), load[k, c] + half[c])
             out[k, c] = (read - load[k, c]) / half[c]
     return out
-
-
-def _numbers(vector: Array) -> str:
-    return ", ".join(f"{v:.2g}" for v in vector)
