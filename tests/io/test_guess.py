@@ -74,6 +74,23 @@ def test_a_torque_has_many_spellings(tmp_path: Path, unit: str, size: float) -> 
     np.testing.assert_allclose(stream.channels["torque"][0], np.multiply(W[3:], size))
 
 
+def test_a_unit_behind_an_axis_is_read(tmp_path: Path) -> None:
+    names = ["t", "Fx_kN", "Fy_kN", "Fz_kN", "tau_x_N_mm", "tau_y_N_mm", "tau_z_N_mm", "qw", "qx", "qy", "qz"]
+    names += ["pos_x_mm", "pos_y_mm", "pos_z_mm", "acc_x_m_s2", "acc_y_m_s2", "acc_z_m_s2"]
+    row = [*W, *Q, 100, 200, 300, 0, 0, 9.81]
+    channels = bare(tmp_path, names, [0, *row], [0.01, *row]).channels
+    np.testing.assert_allclose(channels["force"][0], np.multiply(W[:3], 1e3))
+    np.testing.assert_allclose(channels["torque"][0], np.multiply(W[3:], 1e-3))
+    np.testing.assert_allclose(channels["position"][0], [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(channels["specific_force"][0], [0, 0, 9.81])
+
+
+def test_letters_behind_an_axis_that_are_no_unit_of_it_are_refused(tmp_path: Path) -> None:
+    names = ["t", "fx_m", "fy_m", "fz_m", "tx_m", "ty_m", "tz_m", "qw", "qx", "qy", "qz"]  # as measured, perhaps
+    with pytest.raises(BadDescription, match='unknown unit "m" of force'):
+        bare(tmp_path, names, [0, *W, *Q], [0.01, *W, *Q])
+
+
 def test_the_example_of_a_description_has_the_position(tmp_path: Path) -> None:
     names = ["time", "fx", "fy", "fz", "tx", "ty", "tz", "x [mm]", "y [mm]", "z [mm]", "rx", "ry", "rz"]
     with pytest.raises(BadDescription) as caught:

@@ -57,6 +57,13 @@ _LOOSE = re.compile("[fs]")
 _EARTH = (9.76, 9.84)
 # A unit in brackets behind a name; a number there is an index.
 _IN_BRACKETS = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
+# What stands behind an axis for a unit, the longest first: Fx_N, tau_z_Nm, tau_z_N_m, pos_x_mm, acc_y_m_s2.
+_AXES = frozenset("xyz")
+_BEHIND_AXIS = {
+    f"_{unit.replace('*', joint).replace('/', '_').replace('^', '')}": unit
+    for unit in sorted({unit for units in UNITS.values() for unit in units} - {"1"}, key=len, reverse=True)
+    for joint in ("_", "")
+}
 # What stands between the letters of a unit, or nothing: N*m, N m, N.m, N·m, Nm; m/s^2, m/s2.
 _BETWEEN = re.compile(r"[\s*·⋅.^-]")
 
@@ -78,9 +85,13 @@ def local_g(gravity: Array) -> float:
 
 
 def apart(name: str) -> tuple[str, str]:
-    """Return the name of a column and the unit in brackets behind it, "" where there is none: "Fx [N]"."""
-    found = _IN_BRACKETS.search(name)
-    return (name[: found.start()], found.group(1)) if found else (name, "")
+    """Return the name of a column and the unit behind it, "" where there is none: "Fx [N]", "Fx_N"."""
+    if found := _IN_BRACKETS.search(name):
+        return name[: found.start()], found.group(1)
+    for ending, unit in _BEHIND_AXIS.items():
+        if name.endswith(ending) and name.removesuffix(ending)[-1:].lower() in _AXES:
+            return name.removesuffix(ending), unit
+    return name, ""
 
 
 def spelled(quantity: str, unit: str) -> str:
