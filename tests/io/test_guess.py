@@ -91,6 +91,20 @@ def test_letters_behind_an_axis_that_are_no_unit_of_it_are_refused(tmp_path: Pat
         bare(tmp_path, names, [0, *W, *Q], [0.01, *W, *Q])
 
 
+@pytest.mark.parametrize("where", ["base", "world", "ft_base_link"])
+def test_a_wrench_by_the_name_of_a_base_wants_a_description(tmp_path: Path, where: str) -> None:
+    wrench = [f"{where}_{vector}_{axis}" for vector in ("force", "torque") for axis in "xyz"]
+    row = [0, *W, *Q]
+    with pytest.raises(BadDescription) as caught:
+        bare(tmp_path, ["t", *wrench, "qw", "qx", "qy", "qz"], row, row)
+    lines = stream_lines(str(caught.value))
+    assert lines.count(', frame = "W" }   # if in the base\'s axes; else without frame') == 2
+    # A wrench of the sensor beside it is taken.
+    names = ["t", *wrench, "fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
+    rows = [[t, *np.zeros(6), *W, *Q] for t in (0, 0.01)]
+    np.testing.assert_array_equal(bare(tmp_path, names, *rows).channels["force"][0], W[:3])
+
+
 def test_the_example_of_a_description_has_the_position(tmp_path: Path) -> None:
     names = ["time", "fx", "fy", "fz", "tx", "ty", "tz", "x [mm]", "y [mm]", "z [mm]", "rx", "ry", "rz"]
     with pytest.raises(BadDescription) as caught:

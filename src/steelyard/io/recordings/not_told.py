@@ -151,7 +151,10 @@ def _vector_line(table: Table, names: Names, quantity: str) -> str | None:
         remark = _OF_S
     elif found in several and len(several) > 1:
         remark = _or(table, several).lstrip()
-    return _line(table, found, f'unit = "{unit}"', remark)
+    frame = ""
+    if names.of_base(quantity, found):
+        frame, remark = ', frame = "W"', f"if in the base's axes; else without frame{_or(table, several)}"
+    return _line(table, found, f'unit = "{unit}"{frame}', remark)
 
 
 def _or(table: Table, several: Sequence[tuple[int, ...]]) -> str:

@@ -38,6 +38,8 @@ _SECONDS = ("secs", "seconds")  # the whole stamp, unless its nanoseconds stand 
 _SPLIT = (("sec", "nanosec"), ("secs", "nsecs"), ("zeitinsec", "zeitinnanosec"))
 # Words of a name that say what was wanted, not what was measured.
 WANTED = {"desired", "target", "goal", "cmd", "command", "commanded", "ref", "reference", "setpoint"}
+# Words of a name that say that a wrench may have the axes of W.
+_OF_BASE = {"base", "world"}
 _SEPARATOR = re.compile(r"[^a-z0-9]+")
 
 _XYZ = ("x", "y", "z")
@@ -75,8 +77,17 @@ class Names:
         return [tuple(self.plain[each + name] for name in names) for each in measured or found]
 
     def vector(self, quantity: str) -> tuple[int, ...]:
-        """Return the three columns of a vector, x first; nothing where there are none."""
-        return next((found for three in _three(quantity) if (found := self.all_of(three, _alone(three)))), ())
+        """Return the three columns of a vector, x first; nothing where there are none.
+
+        A wrench by the name of a base is left out: only a description can say whether its axes are those of W.
+        """
+        found = next((found for three in _three(quantity) if (found := self.all_of(three, _alone(three)))), ())
+        return () if self.of_base(quantity, found) else found
+
+    def of_base(self, quantity: str, numbers: Sequence[int]) -> bool:
+        """Whether the columns of a force or a torque are called after a base or the world."""
+        called = (name for name, number in self.plain.items() if number in numbers)
+        return quantity in ("force", "torque") and any(_OF_BASE & set(name.split("_")) for name in called)
 
     def vectors(self, quantity: str) -> list[tuple[int, ...]]:
         """Return the columns of each vector that may be meant, where several prefixes have one."""
