@@ -74,6 +74,15 @@ def test_a_torque_has_many_spellings(tmp_path: Path, unit: str, size: float) -> 
     np.testing.assert_allclose(stream.channels["torque"][0], np.multiply(W[3:], size))
 
 
+@pytest.mark.parametrize("units", ["s,kN,kN,kN", "s,kN,kN,kN,,,,,,,,", "s,kN,kN,kN,Nm,Nm,Nm,-,-,-,-,,"])
+def test_a_row_of_units_may_be_shorter_than_its_table_or_end_in_delimiters(tmp_path: Path, units: str) -> None:
+    names = ["t", "fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
+    rows = [",".join(map(str, [t, *W, *Q])) for t in (0, 0.01)]
+    (tmp_path / "data.csv").write_text("\n".join([",".join(names), units, *rows]))
+    (stream,) = read_recording(tmp_path / "data.csv").streams
+    np.testing.assert_allclose(stream.channels["force"][0], np.multiply(W[:3], 1e3))
+
+
 def test_a_unit_behind_an_axis_is_read(tmp_path: Path) -> None:
     names = ["t", "Fx_kN", "Fy_kN", "Fz_kN", "tau_x_N_mm", "tau_y_N_mm", "tau_z_N_mm", "qw", "qx", "qy", "qz"]
     names += ["pos_x_mm", "pos_y_mm", "pos_z_mm", "acc_x_m_s2", "acc_y_m_s2", "acc_z_m_s2"]

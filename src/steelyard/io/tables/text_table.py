@@ -98,7 +98,7 @@ class TextTable:
         if groups:
             first = split(spread(lines[skip], delimiter), delimiter)
         dates = tuple(n for n, cell in enumerate(first) if is_stamp(cell))
-        units = units if len(units) == len(names) else ()
+        units = _of_columns(units, len(names), delimiter)
         header = Header(names, len(names), groups, dates, _words(first, delimiter), units)
         return cls(path, header, delimiter, skip, first, bool(groups))
 
@@ -211,6 +211,15 @@ def _below_preamble(lines: list[str], rows: list[int]) -> list[int]:
         if len(cells) == width:
             return rows[k:] if k and are_words(cells, delimiter) else rows
     return rows
+
+
+def _of_columns(units: tuple[str, ...], count: int, delimiter: str | None) -> tuple[str, ...]:
+    """Return a row of units with one for each of `count` columns, none where it does not say which is whose."""
+    while len(units) > count and not units[-1]:
+        units = units[:-1]
+    if units and delimiter is not None:
+        units += ("",) * (count - len(units))
+    return units if len(units) == count else ()
 
 
 def _words(cells: Sequence[str], delimiter: str | None) -> tuple[int, ...]:
