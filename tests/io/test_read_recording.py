@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from steelyard.errors import BadDescription, BadValue
+from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io import read_recording
 from steelyard.io.rotations import rotation_of
 from steelyard.io.units import local_g
@@ -389,6 +390,62 @@ def test_parquet(tmp_path: Path) -> None:
     assert stream.time is not None
     assert stream.time.tolist() == [0.931759, 0.931760, 0.931761, 0.931762]
     assert stream.channels["force"].tolist() == [FORCE] * 4
+
+
+LISTS = """
+    [[stream]]
+    path = "a.parquet"
+    time = { columns = ["t"] }
+    force = { columns = ["wrench[0]", "wrench[1]", "wrench[2]"] }
+    torque = { columns = ["wrench[3]", "wrench[4]", "wrench[5]"] }
+    rotation = { columns = ["quat"], form = "quaternion-wxyz" }
+"""
+
+
+@pytest.mark.parametrize("kind", ["list_", "large_list", "fixed"])
+def test_lists_of_parquet(tmp_path: Path, kind: str) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    wrench: list[list[float] | None] = [[*FORCE, 1, 2, 3] for _ in range(40)]
+    wrench[0] = wrench[7] = None
+    number = arrow.float32()
+    columns = {
+        "t": np.arange(40) / 100,
+        "wrench": arrow.array(wrench, arrow.list_(number, 6) if kind == "fixed" else getattr(arrow, kind)(number)),
+        "quat": [[1.0, 0.0, 0.0, 0.0]] * 40,
+        "name": [["x", "y"]] * 40,
+        "depth": [[0.0] * 5000] * 40,
+    }
+    parquet.write_table(arrow.table(columns), tmp_path / "a.parquet", row_group_size=13)
+    recording = read(tmp_path, LISTS)
+    assert "2 of 40 rows of 'a.parquet' miss a number in force, torque: rows 1, 8." in recording.findings[0].message
+    stream = only(recording)
+    assert stream.channels["force"].tolist() == [FORCE] * 38
+    assert stream.channels["torque"].tolist() == [[1, 2, 3]] * 38
+    with pytest.raises(BadDescription, match=r'torque   = { columns = \["wrench\[3\]", "wrench\[4\]", "wrench\[5\]"\]'):
+        read_recording(tmp_path / "a.parquet")  # in which order a "quat" is, only a description says
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "message"),
+    [
+        (
+            "wrench",
+            [[1.0, 2, 3, 4, 5, 6]] * 3 + [[1.0, 2]],
+            'the lists of column "wrench" have 6 items, and 2 in row 4',
+        ),
+        ("wrench", [["a"] * 6] * 4, 'column "wrench" must hold numbers; it holds list<'),
+    ],
+)
+def test_lists_of_parquet_that_are_no_vectors_are_refused(
+    tmp_path: Path, column: str, values: list[object], message: str
+) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    columns = {"t": [0.0, 0.1, 0.2, 0.3], "wrench": [[1.0] * 6] * 4, "quat": [[1.0, 0.0, 0.0, 0.0]] * 4}
+    parquet.write_table(arrow.table(columns | {column: values}), tmp_path / "a.parquet")
+    with pytest.raises(BadFile, match=re.escape(message)):
+        read(tmp_path, LISTS)
 
 
 @pytest.mark.parametrize("unit", ["ms", "us", "ns"])

@@ -21,9 +21,8 @@ from numpy.lib import format as npy
 
 from steelyard.errors import BadFile
 from steelyard.io.contents import require_bounded
-from steelyard.io.tables.files import Columns, Header
+from steelyard.io.tables.files import WIDEST, Columns, Header, spread_columns
 
-_WIDEST = 4096
 _MOST_COLUMNS = 65_536
 _NUMBERS = "fiub"  # kinds of dtype
 _PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of numpy
@@ -50,23 +49,16 @@ class ArrayTable:
     @classmethod
     def open(cls, path: Path) -> ArrayTable:
         """Read the array headers only; raises BadFile."""
-        names: list[str] = []
-        sources: list[tuple[str, int]] = []
-        groups: dict[str, tuple[int, ...]] = {}
         shapes = {key: array.shape for key, array in array_headers(path).items()}
-        for key, shape in shapes.items():
-            if len(shape) == 1:
-                names.append(key)
-                sources.append((key, 0))
-            elif len(shape) > 1 and (width := int(np.prod(shape[1:]))) <= _WIDEST:
-                groups[key] = tuple(range(len(names), len(names) + width))
-                names += [f"{key}[{i}]" for i in range(width)]
-                sources += [(key, i) for i in range(width)]
-            if len(names) > _MOST_COLUMNS:
-                raise BadFile(f"{path}: holds more than {_MOST_COLUMNS} columns. Save the quantities of the log alone.")
+        widths = {key: math.prod(shape[1:]) if len(shape) > 1 else None for key, shape in shapes.items() if shape}
+        widths = {key: width for key, width in widths.items() if width is None or width <= WIDEST}
+        if sum(1 if width is None else width for width in widths.values()) > _MOST_COLUMNS:
+            raise BadFile(f"{path}: holds more than {_MOST_COLUMNS} columns. Save the quantities of the log alone.")
+        names, groups = spread_columns(widths.items())
+        sources = tuple((key, i) for key, width in widths.items() for i in range(1 if width is None else width))
         if not names:
             raise BadFile(f"{path}: no array with rows is in this NPZ. Save one array per quantity, rows first.")
-        return cls(path, Header(tuple(names), len(names), groups, shapes=shapes), tuple(sources))
+        return cls(path, Header(names, len(names), groups, shapes=shapes), sources)
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
         """Return columns by number, dates in `exact` as datetime64[ns]; raises BadFile where an array is damaged or not

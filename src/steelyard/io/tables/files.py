@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -18,6 +18,7 @@ Column = str | int  # as a description names one
 Columns = dict[int, np.ndarray[Any, np.dtype[Any]]]
 
 TEXT = (".csv", ".tsv", ".txt")
+WIDEST = 4096  # an array with more columns is no quantity of a log
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,20 @@ def find_file(name: str, folder: Path, data: Path | None, asked: str = "") -> Pa
         f'{by}"{name}" was not found. Searched: {", ".join(str(each.absolute()) for each in folders)}. '
         "Correct the path, or give the folder of the data with --data DIR or STEELYARD_DATA."
     )
+
+
+def spread_columns(widths: Iterable[tuple[str, int | None]]) -> tuple[tuple[str, ...], dict[str, tuple[int, ...]]]:
+    """Return the names of all columns, and the groups of those that an array or a list holds: force -> force[0], ..
+
+    widths  name and number of columns of each array, None of one that is a column itself
+    """
+    names: list[str] = []
+    groups: dict[str, tuple[int, ...]] = {}
+    for name, width in widths:
+        if width is not None:
+            groups[name] = tuple(range(len(names), len(names) + width))
+        names += [name] if width is None else [f"{name}[{i}]" for i in range(width)]
+    return tuple(names), groups
 
 
 def choose_columns(header: Header, wanted: Sequence[Column], count: int | None, where: str) -> tuple[int, ...]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadValue
+from steelyard.io.tables.files import spread_columns
 
 STAMP_TYPE = "U48"  # longer than any stamp of the form below
 _WORDS = re.compile(r'"[^"]*"|\S+')
@@ -185,11 +186,5 @@ def spread_names(names: Sequence[str], cells: Sequence[str]) -> tuple[tuple[str,
 
     cells  the first row, with its lists
     """
-    out: list[str] = []
-    groups: dict[str, tuple[int, ...]] = {}
-    for name, cell in zip(names, cells, strict=True):
-        count = len(items(cell)) if is_list(cell) else 0
-        if count:
-            groups[name] = tuple(range(len(out), len(out) + count))
-        out += [f"{name}[{i}]" for i in range(count)] if count else [name]
-    return tuple(out), groups
+    widths = (len(items(cell)) if is_list(cell) else None for cell in cells)
+    return spread_columns(zip(names, widths, strict=True))
