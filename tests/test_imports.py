@@ -48,8 +48,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "report": UPPER | {"evaluate", "evidence", "tables", "whole_files"},
     "pipelines": UPPER | {"simulate", "evaluate", "sanity"},
     "io": {
-        "spatial", "inertia", "logs.clock", "logs.log", "logs.moments", "logs.recording", "logs.team_log",
-        "logs.team_track", "logs.team_streams", "robots.omnid", "robots.serial", "team.estimate", "shape.mesh",
+        "spatial", "inertia", "logs.clock", "logs.holes", "logs.intervals", "logs.log", "logs.moments",
+        "logs.recording", "logs.team_log", "logs.team_track", "logs.team_streams", "robots.omnid", "robots.serial",
+        "team.estimate", "shape.mesh",
         "shape.tets", "shape.nesting", "shape.cloud", "shape.known_space", "shape.eight_bits", "shape.views",
         "parts.parts", "parts.from_mesh", "parts.hierarchy", "datasets", "identify.estimate", "evidence", "whole_files",
     },

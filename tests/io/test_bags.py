@@ -186,6 +186,22 @@ def test_a_pose_out_of_transforms(tmp_path: Path) -> None:
         assert values[0][0] == START
 
 
+@pytest.mark.parametrize("moves", [True, False])
+def test_where_a_slower_transform_was_lost_in_motion_there_is_no_pose(tmp_path: Path, moves: bool) -> None:
+    maker = Maker(ROS2)
+    out: list[Message] = []
+    for n in range(400):  # base -> arm at 100 Hz, arm -> wrist at 50 Hz but for 2 s
+        stamp = START + n * 10_000_000
+        out.append(("/tf", TF, stamp, maker.transforms(stamp, {("base", "arm"): Pose.identity()})))
+        if n % 2 == 0 and not 100 < n < 300:
+            turn = Rotation.exp([0.0, 0.0, 0.01 * (n if moves else min(n, 100) + max(n - 300, 0))])
+            told = {("arm", "wrist"): Pose(turn, np.zeros(3))}
+            out.append(("/tf", TF, stamp, maker.transforms(stamp, told)))
+    write_bag(tmp_path / "run", out)
+    stamps = (_table(tmp_path / "run", ("base", "wrist")).read([0], (0,))[0] - START) // 10_000_000
+    assert stamps.tolist() == ([*range(100), *range(300, 399)] if moves else [*range(399)])
+
+
 def _table(path: Path, frames: tuple[str, str]) -> Any:
     return open_table(path, "/tf", frames)
 

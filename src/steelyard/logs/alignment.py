@@ -19,12 +19,13 @@ from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Mounting
+from steelyard.logs.intervals import inside, merged
 from steelyard.logs.joint_fit import refine
 from steelyard.logs.jumped_stamps import Placed
 from steelyard.logs.kinematics import Motion
 from steelyard.logs.log import MotionLog
 from steelyard.logs.noise import classes, levels
-from steelyard.logs.outliers import bursts, inside, merged
+from steelyard.logs.outliers import bursts
 from steelyard.logs.prepared import AlignOptions, Prepared, prepared
 from steelyard.logs.recording import Recording
 from steelyard.logs.steady import with_steady_stamps

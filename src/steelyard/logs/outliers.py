@@ -7,6 +7,7 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.logs.clock import sampling_rate
 from steelyard.logs.conditioning import lowpass
+from steelyard.logs.intervals import merged
 
 _SPLIT_HZ = 20.0  # a held body moves below, a knock rings above
 _PEAK, _EDGE = 8.0, 4.0  # sigmas to call a tap, and to end it
@@ -34,24 +35,6 @@ def bursts(time: Array, values: Array, margin_s: float = 0.03) -> Array:
     whole = ~_beside_gaps(time, rate)
     peak = (size > _PEAK * level) & (size > floor) & whole
     return _intervals(time, peak, (size > _EDGE * level) & whole, margin_s)
-
-
-def merged(*groups: Array) -> Array:
-    """Return the union of groups of intervals (K, 2) as disjoint intervals in order."""
-    parts = np.concatenate([np.zeros((0, 2)), *groups])
-    parts = parts[np.argsort(parts[:, 0])]
-    if len(parts) < 2:
-        return parts
-    ends = np.maximum.accumulate(parts[:, 1])
-    first = np.concatenate([[True], parts[1:, 0] > ends[:-1]])
-    last = np.concatenate([first[1:], [True]])
-    return np.stack([parts[first, 0], ends[last]], 1)
-
-
-def inside(time: Array, intervals: Array) -> Mask:
-    """Return which of `time` (N,) lie in disjoint, ordered intervals (K, 2)."""
-    edges = intervals.ravel()
-    return np.asarray(np.searchsorted(edges, time, "right") % 2 == 1)
 
 
 def _beside_gaps(time: Array, rate: float) -> Mask:

@@ -13,8 +13,8 @@ from steelyard.logs.clock import sampling_rate
 from steelyard.logs.felt import Felt
 from steelyard.logs.holes import unknown_motion
 from steelyard.logs.imu import Imu, imu
+from steelyard.logs.intervals import inside, merged
 from steelyard.logs.kinematics import Kinematics, kinematics
-from steelyard.logs.outliers import inside, merged
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.smoothing import SMEARED
 

@@ -1,8 +1,8 @@
 """The pose of one frame in another, from the transforms of a bag (/tf and /tf_static), as a table.
 
 Its columns are `stamp` [ns since 1970], "position" in three and "rotation" in four, a quaternion xyzw. Where several
-transforms lie between the frames, rows are those of the one that comes most often; others are interpolated to it.
-Where no transform of a topic has a stamp, its time of receipt is taken.
+transforms lie between the frames, rows are those of the one that comes most often; others are interpolated to it, but
+for where one went on unseen. Where no transform of a topic has a stamp, its time of receipt is taken.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Integers
+from steelyard.check import Integers, Mask
 from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io.bags import TRANSFORMS, Bag, open_bag
 from steelyard.io.contents import require_bounded
@@ -26,6 +26,9 @@ from steelyard.io.rotations import NORM, rotation_of
 from steelyard.io.streams.channels import MOST_MISSING
 from steelyard.io.tables.bag_table import STAMP, stamps_of
 from steelyard.io.tables.files import Columns, Header
+from steelyard.logs.holes import unknown_motion
+from steelyard.logs.intervals import inside
+from steelyard.logs.recording import Stream
 from steelyard.spatial import Pose, Rotation
 
 _NAMES = (STAMP, *(f"position.{axis}" for axis in "xyz"), *(f"rotation.{part}" for part in "xyzw"))
@@ -39,6 +42,14 @@ class Link:
     stamps: Integers
     poses: Pose
     fixed: bool
+
+    def unseen(self, stamps: Integers) -> Mask:
+        """Return which of stamps (N,) lie where the frame went on and no transform of it came for long."""
+        if self.fixed:
+            return np.zeros(len(stamps), np.bool_)
+        places = {"rotation": self.poses.rotation.matrix, "position": self.poses.position}
+        start = self.stamps[0]  # seconds since then are exact enough as floats
+        return inside(1e-9 * (stamps - start), unknown_motion(Stream("", places, 1e-9 * (self.stamps - start))))
 
     def at(self, stamps: Integers) -> Pose:
         """Return the poses at stamps within its own; between two of them it turns and moves evenly."""
@@ -148,12 +159,13 @@ class TransformTable:
             )
         stamps = max((link.stamps for link in moving), key=len)
         start, end = max(link.stamps[0] for link in moving), min(link.stamps[-1] for link in moving)
-        inside: Integers = stamps[(stamps >= start) & (stamps <= end)]
-        if not len(inside):
+        seen = (stamps >= start) & (stamps <= end)
+        shared: Integers = stamps[seen & ~np.logical_or.reduce([link.unseen(stamps) for link in moving])]
+        if not len(shared):
             raise BadFile(
                 f'{self.path}: transforms between "{self.frames[0]}" and "{self.frames[1]}" have no time in common.'
             )
-        return inside
+        return shared
 
 
 def _line(heard: Transforms, frame: str) -> list[str]:

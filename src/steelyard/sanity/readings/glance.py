@@ -18,7 +18,8 @@ from steelyard.logs.conditioning import lowpass
 from steelyard.logs.felt import Felt
 from steelyard.logs.holes import holes, unknown_motion
 from steelyard.logs.imu import first_mount
-from steelyard.logs.outliers import bursts, inside, merged
+from steelyard.logs.intervals import inside, merged
+from steelyard.logs.outliers import bursts
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import cross_matrix, lever_matrix
 
