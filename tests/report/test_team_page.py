@@ -27,7 +27,7 @@ from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.tables.numbers import general
 from steelyard.tables.team import team_table
-from steelyard.team.estimate import GraspEstimate, TeamEstimate
+from steelyard.team.estimate import BodyEstimate, GraspEstimate, HingeEstimate, TeamEstimate
 from steelyard.team.joint import JointTeam
 
 
@@ -184,3 +184,35 @@ def test_table_and_page_show_the_same_two_figures_of_a_spread() -> None:
     assert "1000.00 ± 0.10 mm" in table
     assert '<span class="v">0.00, 0.00, 57.30</span><span class="pm"> ± 0.10</span>' in page
     assert '<span class="v">1000.00</span><span class="pm">\u202f±\u202f0.10</span>' in page
+
+
+def test_table_and_page_tell_what_each_of_two_bodies_shows_and_what_it_does_not() -> None:
+    shown = BodyEstimate(("r0",), 0.31, 0.02, np.array([0.3, 0.4, 0.0]), np.full(3, 0.01), 0.01, np.array([0.8, 2.0]))
+    nan = np.full(3, np.nan)
+    unseen = BodyEstimate(("r1", "r2"), np.nan, np.nan, nan, nan, np.nan, nan[:2])
+    hinge = HingeEstimate(np.array([0.0, 0, 1]), np.zeros(3), 0.1, 1e-3, np.deg2rad(17), (shown, unseen))
+    seen = replace(around(3), hinge=hinge)
+    lines = team_table(seen, "a team").splitlines()
+    at = lines.index("  two bodies with a hinge")
+    assert [cell.strip() for cell in re.split(" {3,}", lines[at + 2].strip())] == [
+        "held by r0", "0.310 ± 0.020 kg m²", "0.500 ± 0.010 kg m", "0.800 and 2.00 kg",
+    ]  # fmt: skip
+    assert re.split(" {3,}", lines[at + 3].strip()) == ["held by r1, r2", "not shown", "not shown", "not shown"]
+    page = html.unescape(render(team_page("a team", seen)))
+    section = page[page.index("Two bodies with a hinge") : page.index("All ten parameters")]
+    words = re.sub(r"\s+", " ", re.sub("<[^>]+>", " ", section).replace("\u202f", " ").replace("\xa0", " "))
+    assert "swung by 17° to either side" in words
+    assert "r0 0.310 ± 0.020 kg m² 0.500 ± 0.010 kg m 0.800 to 2.00 kg" in words
+    assert "r1, r2 not shown not shown not shown" in words
+    assert "10 of 17" in page
+
+
+def test_small_moments_are_told_in_small_units_and_clocks_by_their_bars() -> None:
+    light = around(2)
+    small = replace(light, parameters=InertialParameters(light.parameters.vector * 1e-2))
+    for seen, unit in ((small, "kg mm²"), (light, "kg m²")):
+        moments = [line for line in team_table(seen, "a team").splitlines() if line.startswith("    J")]
+        assert len(moments) == 3
+        assert all(line.endswith(f" {unit}") for line in moments)
+    late = replace(light, clock_offsets_s={"r0": 0.0, "r1": -0.000042}, clock_offset_std_s={"r0": 0.0, "r1": 9.4e-5})
+    assert "clock late by −0.042 ms" in render(team_page("a team", late))

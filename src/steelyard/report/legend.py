@@ -14,7 +14,7 @@ from steelyard.report.palette import hexadecimal, scale_stops
 from steelyard.report.plots import share_bar, swatch
 from steelyard.report.projection import picture
 from steelyard.report.scene import Scene
-from steelyard.tables.numbers import fixed, general, mass_unit, places_of
+from steelyard.tables.numbers import density, fixed, general, mass_unit, places_of
 from steelyard.team.estimate import TeamEstimate
 
 MOST_PARTS = 200
@@ -116,9 +116,7 @@ def _part(report: Report, part: PartMass, colour: tuple[int, int, int], share: f
     factor, unit = mass_unit(report.estimate.mass)
     name = report.name_of(part.label)
     true = report.truth.masses.get(part.label) if report.truth is not None else None
-    said: list[object] = [
-        f"{general(1e6 * part.volume)} cm³ · {general(part.density, 2 if part.density < 1e3 else 3)} kg/m³"
-    ]
+    said: list[object] = [f"{general(1e6 * part.volume)} cm³ · {density(part)} kg/m³"]
     if part.material:
         said += [" · ", tag("b", part.material)]
     if true is not None:
