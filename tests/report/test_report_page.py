@@ -174,6 +174,8 @@ def test_hostile_names_stay_text(full: Report, estimate: Estimate) -> None:
     assert "$title" in page.words
     drawn = json.loads(page.scripts[0])
     assert drawn["bodies"][0]["name"] == HOSTILE[:80]
+    turned = Page(render(replace(full, names={0: "head \u202ereversed"})))
+    assert json.loads(turned.scripts[0])["bodies"][0]["name"] == "head \ufffdreversed"
 
 
 @given(st.text())

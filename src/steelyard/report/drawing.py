@@ -20,6 +20,7 @@ from steelyard.report.palette import density_colours, hexadecimal, part_colour
 from steelyard.report.scene import Body, Scene
 from steelyard.report.surfaces import corner_normals
 from steelyard.tables.numbers import fixed, mass_unit, places_of, principal, round_step
+from steelyard.tables.printable import printable
 from steelyard.team.estimate import TeamEstimate
 
 PAYLOAD, UNSEEN = 0, (158, 168, 176)  # a team's ring through the grasps, and its colour
@@ -80,7 +81,7 @@ def drawing(report: Report, scene: Scene) -> dict[str, Any]:
         part = known.get(body.label)
         rows.append({
             "label": body.label,
-            "name": report.name_of(body.label)[:80],
+            "name": printable(report.name_of(body.label))[:80],
             "says": "" if part is None else _weight(part, report.estimate.mass),
             "colour": hexadecimal(apart[body.label]),
             "dense": hexadecimal(density.get(body.label, (150, 150, 150))),
