@@ -16,7 +16,7 @@ _MILLIONTH = 1e-6
 
 def decimals(std: float) -> int:
     """Return how many decimals show two figures of a standard deviation."""
-    if not np.isfinite(std) or std <= 0:
+    if not std > 0:
         return 3
     rounded = float(f"{std:.1e}")  # 0.0999 is shown as 0.10, not as 0.100
     return int(np.clip(1 - np.floor(np.log10(rounded)), 0, 9))
@@ -25,7 +25,7 @@ def decimals(std: float) -> int:
 def round_step(top: float) -> float:
     """Return the largest of 1, 2, 5 times a power of ten that is not above `top`."""
     power = 10.0 ** np.floor(np.log10(top))
-    return float(power * max(step for step in (1, 2, 5) if step * power <= top * (1 + 1e-9)))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= top))
 
 
 def fixed(value: float, places: int) -> str:
