@@ -20,12 +20,14 @@ from steelyard.errors import BadFile, BadValue
 from steelyard.evidence import Evidence, PartMass
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
+from steelyard.inertia import InertialParameters
 from steelyard.inertia.solids import box
-from steelyard.report import Report, Residuals, Truth, render, scene_of_solid, write_report
+from steelyard.report import Report, Residuals, Truth, render, scene_of_mesh, scene_of_solid, write_report
 from steelyard.report.markup import script_json, tag, text
 from steelyard.report.numbers import measured
 from steelyard.report.scene import MOST_TRIANGLES
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.tables.numbers import spread
@@ -320,6 +322,23 @@ def test_the_bound_of_every_sample_is_in_the_plot(full: Report) -> None:
     places = np.array([pair.split(",") for pair in band.split()], float)
     assert places[:, 1].min() == pytest.approx(50 - 50 / 1.06, abs=0.1)
     assert places[places[:, 1].argmin(), 0] == pytest.approx(250 / 499 * 420, abs=1)
+
+
+def test_an_answer_that_is_no_body_has_a_page_without_moments_and_marks(full: Report, estimate: Estimate) -> None:
+    negative = replace(full, estimate=replace(estimate, parameters=InertialParameters(-estimate.parameters.vector)))
+    page = Page(render(negative))
+    assert "−690.0" in page.words
+    assert "Principal inertianot fixed" in page.words
+    assert "Centre of mass" not in re.findall(r'data-show="com"[^>]*>([^<]*)<', render(negative))
+    assert json.loads(page.scripts[0])["marks"] == {}
+    assert json.loads(Page(render(full)).scripts[0])["marks"] != {}
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_a_sheet_is_drawn_from_either_side(full: Report, turned: int) -> None:
+    corners = np.array([[0.0, 0, 0], [0.3, 0, 0], [0.3, 0.1, 0], [0, 0.1, 0]])
+    sheet = TriangleMesh(corners, np.array([[0, 1, 2], [0, 2, 3]])[:, ::turned], np.zeros(2, np.int64))
+    assert Page(render(replace(full, scene=scene_of_mesh(sheet)))).count("canvas") == 1
 
 
 def test_numbers_that_are_none_are_refused(full: Report) -> None:

@@ -96,7 +96,7 @@ def _part_lines(estimate: Weighed, truth: Mapping[int, tuple[str, float]]) -> li
             name, mass = truth[part.label]
             known = f"truth {factor * mass:.{places_of(factor * part.mass, factor * part.std)}f}"
         mass_cell = plus_minus(factor * part.mass, factor * part.std, unit)
-        place = ", ".join(f"{round(1e3 * value) + 0}" for value in part.centroid)
+        place = ", ".join(f"{round(1e3 * value)}" for value in part.centroid)
         row = (
             f"part {part.label} {name}".rstrip(), mass_cell, known, f"{density(part)} kg/m³", f"at ({place}) mm",
             part.material or "",
