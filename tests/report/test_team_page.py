@@ -216,3 +216,11 @@ def test_small_moments_are_told_in_small_units_and_clocks_by_their_bars() -> Non
         assert all(line.endswith(f" {unit}") for line in moments)
     late = replace(light, clock_offsets_s={"r0": 0.0, "r1": -0.000042}, clock_offset_std_s={"r0": 0.0, "r1": 9.4e-5})
     assert "clock late by −0.042 ms" in render(team_page("a team", late))
+
+
+def test_no_spokes_lead_to_the_centre_of_what_is_no_body() -> None:
+    seen = around(3)
+    none = replace(seen, parameters=InertialParameters(-seen.parameters.vector))
+    with_spokes, without = (len(team_scene(each).bodies[0].vertices) for each in (seen, none))
+    assert without < with_spokes
+    assert render(team_page("no body", none))

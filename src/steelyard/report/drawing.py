@@ -136,11 +136,18 @@ def _marks(estimate: Estimate, scene: Scene, frame: Frame) -> dict[str, Any]:
         marks |= {"grasps": _grasps(estimate, frame), "open": True}
     else:
         marks["sensor"] = {"at": [0.0, 0.0, 0.0], "axes": np.eye(3).tolist()}
-    if estimate.inertia_com is not None and estimate.parameters.validity().consistent:
-        moments, _, ways = principal(estimate)
-        squares = 5 * (moments.sum() / 2 - moments) / estimate.mass  # an even ellipsoid: I_x = m (b^2 + c^2) / 5
-        marks["ellipsoid"] = _plain((ways * np.sqrt(np.maximum(squares, 0))).T)
+    if (ellipsoid := even_ellipsoid(estimate)) is not None:
+        marks["ellipsoid"] = _plain(ellipsoid)
     return marks
+
+
+def even_ellipsoid(estimate: Estimate) -> Array | None:
+    """Return the half axes (3, 3) [m], one per row, of the even ellipsoid with this inertia; None where none has it."""
+    if estimate.inertia_com is None or not estimate.parameters.validity().consistent:
+        return None
+    moments, _, ways = principal(estimate)
+    squares = 5 * (moments.sum() / 2 - moments) / estimate.mass  # I_x = m (b^2 + c^2) / 5
+    return np.asarray((ways * np.sqrt(np.maximum(squares, 0))).T)  # of a plate, rounding may leave less than zero
 
 
 def _grasps(estimate: TeamEstimate, frame: Frame) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import numpy as np
 from steelyard.evidence import PartMass
 from steelyard.findings import counted
 from steelyard.report.contents import Report
-from steelyard.report.drawing import colours_of
+from steelyard.report.drawing import colours_of, even_ellipsoid
 from steelyard.report.markup import Html, joined, tag
 from steelyard.report.numbers import measured
 from steelyard.report.palette import hexadecimal, scale_stops
@@ -62,7 +62,7 @@ def _controls(report: Report, scene: Scene, known: bool) -> Html:
         team = isinstance(seen, TeamEstimate)
         frames = {"grasps": "Grasp frames"} if team else {"sensor": "Sensor frame"}
         shows = {"com": "Centre of mass", **frames, **shows}
-        if seen.inertia_com is not None:
+        if even_ellipsoid(seen) is not None:
             shows["ellipsoid"] = "Inertia ellipsoid"
     if scene.points is not None:
         shows["points"] = "Points"
