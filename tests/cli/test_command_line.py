@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import resource
 import shutil
 import subprocess
@@ -522,6 +523,25 @@ def test_compare_says_large_moments_in_large_units_in_columns(tmp_path: Path) ->
     assert [line.split(" ± ")[0] for line in lines if line.startswith("  I")] == [
         "  Ixx     6.00", "  Ixy     0.00", "  Ixz     0.00", "  Iyy     0.40", "  Iyz     0.00", "  Izz     5.80",
     ]  # fmt: skip
+
+
+def test_compare_says_how_far_only_of_what_is_far(tmp_path: Path) -> None:
+    def result(name: str, mass: float) -> Path:
+        body = InertialParameters.from_com(mass, np.array([0.0, 0.4, 0.01]), np.diag([0.6, 0.04, 0.58]))
+        evidence = Evidence(10, 3.0, 100, 20, 0.01, 0.002)
+        write_result(
+            Estimate(body, 1e-14 * np.eye(10), "noise-aware", evidence, np.ones(10, np.bool_)), tmp_path / name
+        )
+        return tmp_path / name
+
+    one, same, other = result("a.json", 1.0), result("b.json", 1.0 + 1e-7), result("c.json", 2.0)
+    near = steelyard("compare", one, same).out
+    assert re.match(r"the same object: p = [\d.e-]+ \(chi² \d+\.\d, 10 degrees of freedom\)\n", near)
+    assert "standard deviations" not in near
+    assert "far beyond" not in near
+    far = steelyard("compare", one, other).out
+    assert re.match(r"not the same object: p = 0 to rounding \(chi² \d\.\de\+\d+, 10 degrees of freedom\)\n", far)
+    assert re.search(r"  mass .*   far beyond both bars\n", far)
 
 
 def test_doctor() -> None:

@@ -164,6 +164,14 @@ def test_centroids_say_where_the_object_sits() -> None:
     assert pose_from_centroids(X.apply(points), mirrored) is None
 
 
+def test_two_parts_say_where_the_object_sits_only_where_both_frames_are_one() -> None:
+    places = np.array([[0.0, 0, 0.1], [0.02, 0, 0.2]])
+    one = pose_from_centroids(places, places)
+    assert one is not None
+    assert one.position.tolist() == [0, 0, 0]
+    assert pose_from_centroids(places, places + np.array([0, 0, 0.01])) is None
+
+
 def test_wrong_scenes_are_named(solid: TetMesh) -> None:
     with pytest.raises(BadValue, match=r"cells need one label each; got \(3,\)"):
         scene_of_solid(solid, np.zeros(3, int))

@@ -224,3 +224,31 @@ def test_no_spokes_lead_to_the_centre_of_what_is_no_body() -> None:
     with_spokes, without = (len(team_scene(each).bodies[0].vertices) for each in (seen, none))
     assert without < with_spokes
     assert render(team_page("no body", none))
+
+
+@pytest.mark.parametrize(("width", "turns"), [(0.06, [0.3, 0.3, 3.0]), (2e-4, [3.0, 0, 0])])
+def test_the_payload_is_seen_from_above_whether_its_grasps_span_a_plane_or_nearly_a_line(
+    width: float, turns: list[float]
+) -> None:
+    triangle = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.45, width, 0]])
+    for turn in Rotation.exp(np.random.default_rng(0).normal(size=(12, 3)) * turns).matrix:
+        places = triangle @ turn.T
+        body = InertialParameters.from_com(12.0, places.mean(0), np.eye(3))
+        view = team_scene(answer(body, {f"r{k}": Pose(Rotation.identity(), p) for k, p in enumerate(places)})).view
+        assert view is not None
+        assert view[1, 2] > 0.5
+
+
+def test_what_hands_may_have_moved_is_not_called_left_over() -> None:
+    made = simulate_team(TeamScene(EXACT, sensing="poses", kinds=("grasp", "motion"), motion_samples=300), 1)
+    kinds = [recording.kind for recording in made.log.recordings]
+    assert "grasp" in kinds
+    grasps = {name: made.truth.grasps[k] for k, name in enumerate(made.log.names)}
+    found = answer(made.truth.body, grasps)
+    alone = replace(made.log, recordings=tuple(r for r in made.log.recordings if r.kind != "grasp"))
+    whole, less = team_residuals(made.log, found), team_residuals(alone, found)
+    assert whole is not None
+    assert less is not None
+    assert len(whole.time) == len(less.time)
+    only = team_residuals(replace(made.log, recordings=made.log.recordings[kinds.index("grasp") :][:1]), found)
+    assert only is not None
