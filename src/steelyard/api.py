@@ -236,7 +236,7 @@ def _tool(tool: Tool | None, data: str | Path | None) -> Recording | Estimate | 
     if isinstance(tool, InertialParameters):
         return known_body(tool)
     _require("tool", tool, "a path, a Recording, an Estimate or InertialParameters", str, Path)
-    if Path(tool).suffix == ".json":
+    if Path(tool).suffix.lower() == ".json":
         return read_result(tool)
     recording = read_recording(tool, data)
     if recording.tool is not None:

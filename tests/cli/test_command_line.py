@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import resource
 import shutil
 import subprocess
@@ -18,8 +19,10 @@ import numpy as np
 import pytest
 
 from steelyard.cli.main import VERBS, main
+from steelyard.evidence import Evidence
+from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
-from steelyard.io import read_recording, read_result
+from steelyard.io import read_recording, read_result, write_result
 from steelyard.io.recordings.recording_files import write_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.simulate import hammer
@@ -405,6 +408,12 @@ def test_a_tool_is_taken_away(made: Path, tool: tuple[Path, Path]) -> None:
     assert answers[0]["mass_kg"] == pytest.approx(answers[1]["mass_kg"], rel=1e-6)
 
 
+def test_a_result_is_known_by_its_ending_in_capitals_too(made: Path, tool: tuple[Path, Path], tmp_path: Path) -> None:
+    loud = tmp_path / "TOOL.JSON"
+    shutil.copy(tool[1], loud)
+    assert any("was taken away" in note for note in steelyard("identify", made, "--tool", loud, "--json").json["notes"])
+
+
 def test_a_tool_named_in_the_description(made: Path, tool: tuple[Path, Path], tmp_path: Path) -> None:
     for path in (*made.parent.glob("*.csv"), tool[1]):
         shutil.copy(path, tmp_path)
@@ -500,6 +509,39 @@ def test_compare(made: Path, tool: tuple[Path, Path], tmp_path: Path) -> None:
     grasp = steelyard("compare", first, second, "--any-grasp", "--json").json
     assert grasp["dof"] == 4
     steelyard("compare", first, tmp_path / "none.json").failed(2)
+
+
+def test_compare_says_large_moments_in_large_units_in_columns(tmp_path: Path) -> None:
+    paths = []
+    for mass in (200.0, 210.0):
+        body = InertialParameters.from_com(mass, np.array([0.0, 0.4, 0.01]), mass * np.diag([0.6, 0.04, 0.58]))
+        evidence = Evidence(10, 3.0, 100, 20, 0.01, 0.002)
+        paths.append(tmp_path / f"{mass:.0f}.json")
+        write_result(Estimate(body, 1e-2 * np.eye(10), "noise-aware", evidence, np.ones(10, np.bool_)), paths[-1])
+    lines = steelyard("compare", *paths).out.splitlines()[1:]
+    assert lines[0] == "  mass    10.00 ± 0.14 kg     71 standard deviations"
+    assert [line.split(" ± ")[0] for line in lines if line.startswith("  I")] == [
+        "  Ixx     6.00", "  Ixy     0.00", "  Ixz     0.00", "  Iyy     0.40", "  Iyz     0.00", "  Izz     5.80",
+    ]  # fmt: skip
+
+
+def test_compare_says_how_far_only_of_what_is_far(tmp_path: Path) -> None:
+    def result(name: str, mass: float) -> Path:
+        body = InertialParameters.from_com(mass, np.array([0.0, 0.4, 0.01]), np.diag([0.6, 0.04, 0.58]))
+        evidence = Evidence(10, 3.0, 100, 20, 0.01, 0.002)
+        write_result(
+            Estimate(body, 1e-14 * np.eye(10), "noise-aware", evidence, np.ones(10, np.bool_)), tmp_path / name
+        )
+        return tmp_path / name
+
+    one, same, other = result("a.json", 1.0), result("b.json", 1.0 + 1e-7), result("c.json", 2.0)
+    near = steelyard("compare", one, same).out
+    assert re.match(r"the same object: p = [\d.e-]+ \(chi² \d+\.\d, 10 degrees of freedom\)\n", near)
+    assert "standard deviations" not in near
+    assert "far beyond" not in near
+    far = steelyard("compare", one, other).out
+    assert re.match(r"not the same object: p = 0 to rounding \(chi² \d\.\de\+\d+, 10 degrees of freedom\)\n", far)
+    assert re.search(r"  mass .*   far beyond both bars\n", far)
 
 
 def test_doctor() -> None:

@@ -22,6 +22,7 @@ from steelyard.io.object_folders import write_object
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recordings.recording_files import write_recording
 from steelyard.io.shapes.parts_files import SavedParts, write_parts
+from steelyard.report import Report
 from steelyard.shape.tets import TetMesh
 from steelyard.simulate import hammer
 from steelyard.simulate.workshop import known_object
@@ -122,7 +123,7 @@ def test_only_the_shape_where_nothing_says_where_it_sits(capsys: pytest.CaptureF
     assert err.startswith("Where the object sits in the sensor is not known: only its shape is drawn.")
 
 
-@pytest.mark.parametrize(("x", "said", "placed"), [(0.0, False, True), (0.2, True, False)])
+@pytest.mark.parametrize(("x", "said", "placed"), [(0.0, False, True), (0.01, True, False), (0.2, True, False)])
 def test_a_pose_that_is_not_the_results_is_passed_over(
     capsys: pytest.CaptureFixture[str], folder: Path, x: float, said: bool, placed: bool
 ) -> None:
@@ -133,7 +134,7 @@ def test_a_pose_that_is_not_the_results_is_passed_over(
     arguments = ("@result.json", "--parts", "@hammer.ply", "--pose-in-sensor", pose, "-o", "@out.html", "--json")
     status, out, err = run(capsys, folder, *arguments)
     assert (status, json.loads(out)["placed"]) == (0, placed)
-    assert ("put the parts up to 200 mm from where the result has them, and were passed over" in err) == said
+    assert (f"put the parts up to {1e3 * x:.0f} mm from where the result has them, and were passed over" in err) == said
 
 
 def test_a_truth_that_is_no_body_is_named(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
@@ -152,6 +153,60 @@ def test_truth_names_only_parts_that_are_the_same(capsys: pytest.CaptureFixture[
     page = (folder / "out.html").read_text(encoding="utf-8")
     assert "part 0" in page
     assert "part 1" not in page
+
+
+def test_what_is_said_of_the_place_comes_first_then_the_log_then_the_truth(
+    capsys: pytest.CaptureFixture[str], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pages: list[Report] = []
+    monkeypatch.setattr("steelyard.report.write_report", lambda page, path: (pages.append(page), path.touch()))
+    pose = '{ position = [0.5, 0, 0.12], unit = "m", rotation = [1,0,0, 0,1,0, 0,0,1], form = "matrix" }'
+    drawn = ("@ols.json", "--parts", "@hammer.ply", "-o", "@out.html")
+    for more in (
+        ("--truth", "@hammer/truth.json", "--log", "@log.toml", "--pose-in-sensor", pose),
+        ("--log", "@log.toml"),
+        ("--truth", "@hammer/truth.json"),
+        (),
+    ):
+        assert run(capsys, folder, *drawn, *more)[0] == 0
+    given, of_log, of_truth, bare = (None if page.scene is None else page.scene.X_SO for page in pages)
+    X = hammer.recording(0).tool.X_OS.inverse()
+    assert given is not None
+    assert given.position.tolist() == [0.5, 0, 0.12]
+    for found in (of_log, of_truth):
+        assert found is not None
+        np.testing.assert_allclose(found.position, X.position, atol=1e-9)
+    assert bare is None
+
+
+def test_parts_on_a_line_do_not_say_where_the_object_sits(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    arguments = ("@result.json", "--parts", "@hammer.ply", "-o", "@out.html", "--json")
+    status, out, err = run(capsys, folder, *arguments)
+    assert (status, err, json.loads(out)["placed"]) == (0, "", False)
+
+
+def test_a_log_that_is_not_the_results_is_told(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    changed = json.loads((folder / "ols.json").read_text())
+    (folder / "untared.json").write_text(json.dumps(changed | {"force_bias_N": [0.0, 0.0, 0.0]}))
+    for name, told in (("ols", False), ("untared", True)):
+        status, _, err = run(capsys, folder, f"@{name}.json", "--log", "@log.toml", "-o", "@out.html")
+        assert status == 0
+        assert ("log.toml leaves much more than the result says: was it made of another log" in err) == told
+
+
+@pytest.mark.parametrize(("change", "told"), [("fitted", True), ("none", False)])
+def test_masses_of_true_parts_may_be_fitted_or_unknown(
+    capsys: pytest.CaptureFixture[str], folder: Path, change: str, told: bool
+) -> None:
+    facts = json.loads((folder / "hammer" / "truth.json").read_text())
+    for part in facts["parts"]:
+        mass = part.pop("mass_kg", None) or part.pop("mass_fitted_kg")
+        part.pop("mass_fitted_kg", None)
+        part |= {"mass_fitted_kg": mass} if change == "fitted" else {"mass_kg": None}
+    (folder / "changed.json").write_text(json.dumps(facts))
+    status, _, err = run(capsys, folder, "@result.json", "--truth", "@changed.json", "-o", "@out.html")
+    assert status == 0, err
+    assert (" · truth " in (folder / "out.html").read_text(encoding="utf-8")) == told
 
 
 def test_parts_of_another_object_are_refused(capsys: pytest.CaptureFixture[str], folder: Path) -> None:

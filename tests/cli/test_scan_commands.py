@@ -55,6 +55,13 @@ def test_views_become_a_cloud_and_the_cloud_parts(capsys: pytest.CaptureFixture[
     assert parts.is_file()
 
 
+def test_zero_has_no_sign(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    run(capsys, "workshop", "build", tmp_path, "--tools", "hammer")
+    _, out, _ = run(capsys, "segment", tmp_path / "hammer" / "points.npz")
+    assert " 0.0 " in out
+    assert " -0.0 " not in out
+
+
 def test_a_cloud_is_said_to_lie_in_the_frame_of_its_views(capsys: pytest.CaptureFixture[str], views: Path) -> None:
     cloud, place = views.parent / "said.ply", views / "object.toml"
     _, out, _ = run(capsys, "scan", views, "-o", cloud, "--points", 600)

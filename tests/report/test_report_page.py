@@ -20,12 +20,16 @@ from steelyard.errors import BadFile, BadValue
 from steelyard.evidence import Evidence, PartMass
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
+from steelyard.inertia import InertialParameters
 from steelyard.inertia.solids import box
-from steelyard.report import Report, Residuals, Truth, render, scene_of_solid, write_report
+from steelyard.report import Report, Residuals, Truth, render, scene_of_mesh, scene_of_solid, write_report
+from steelyard.report.drawing import drawing, even_ellipsoid
 from steelyard.report.markup import script_json, tag, text
 from steelyard.report.numbers import measured
+from steelyard.report.plots import interval
 from steelyard.report.scene import MOST_TRIANGLES
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.tables.numbers import spread
@@ -174,6 +178,8 @@ def test_hostile_names_stay_text(full: Report, estimate: Estimate) -> None:
     assert "$title" in page.words
     drawn = json.loads(page.scripts[0])
     assert drawn["bodies"][0]["name"] == HOSTILE[:80]
+    turned = Page(render(replace(full, names={0: "head \u202ereversed"})))
+    assert json.loads(turned.scripts[0])["bodies"][0]["name"] == "head \ufffdreversed"
 
 
 @given(st.text())
@@ -318,6 +324,81 @@ def test_the_bound_of_every_sample_is_in_the_plot(full: Report) -> None:
     places = np.array([pair.split(",") for pair in band.split()], float)
     assert places[:, 1].min() == pytest.approx(50 - 50 / 1.06, abs=0.1)
     assert places[places[:, 1].argmin(), 0] == pytest.approx(250 / 499 * 420, abs=1)
+
+
+def test_an_answer_that_is_no_body_has_a_page_without_moments_and_marks(full: Report, estimate: Estimate) -> None:
+    negative = replace(full, estimate=replace(estimate, parameters=InertialParameters(-estimate.parameters.vector)))
+    page = Page(render(negative))
+    assert "−690.0" in page.words
+    assert "Principal inertianot fixed" in page.words
+    assert "Centre of mass" not in re.findall(r'data-show="com"[^>]*>([^<]*)<', render(negative))
+    assert json.loads(page.scripts[0])["marks"] == {}
+    assert json.loads(Page(render(full)).scripts[0])["marks"] != {}
+
+
+@pytest.mark.parametrize(("moments", "drawn"), [((2e-3, 2e-3, 1e-3), True), ((2e-3, 1e-3, 5e-4), False)])
+def test_an_inertia_that_no_body_has_is_not_offered_as_an_ellipsoid(
+    full: Report, estimate: Estimate, moments: tuple[float, ...], drawn: bool
+) -> None:
+    body = InertialParameters.from_com(0.7, [0, 0, 0.1], np.diag(moments))
+    page = render(replace(full, estimate=replace(estimate, parameters=body)))
+    assert ('data-show="ellipsoid"' in page) == drawn
+    assert ("ellipsoid" in json.loads(Page(page).scripts[0])["marks"]) == drawn
+
+
+def test_a_plate_is_drawn_as_flat_as_it_is(full: Report, estimate: Estimate) -> None:
+    turns = Rotation.exp(np.random.default_rng(0).normal(size=(50, 3))).matrix
+    for turn in turns:
+        plate = InertialParameters.from_com(0.7, [0, 0, 0.1], turn @ np.diag([1e-3, 2e-3, 3e-3]) @ turn.T)
+        half = even_ellipsoid(replace(estimate, parameters=plate))
+        if half is not None:  # rounding may make it no body at all
+            assert np.linalg.norm(half, axis=1).min() < 1e-6
+
+
+def test_a_part_without_mass_and_a_sure_direction_are_drawn(full: Report, estimate: Estimate) -> None:
+    empty = replace(estimate.parts[0], mass=0.0, std=1e-3)
+    directions = np.random.default_rng(0).normal(size=(20, 3))
+    for direction in directions:  # of a covariance of rank one rounding may leave less than zero
+        covariance = 1e-9 * np.eye(10)
+        covariance[1:4, 1:4] = 1e-7 * np.outer(direction, direction)
+        seen = replace(estimate, parts=(empty, estimate.parts[1]), covariance=covariance)
+        assert full.scene is not None
+        drawn = drawing(replace(full, estimate=seen), full.scene)
+        assert np.isfinite(drawn["marks"]["spread"]["axes"]).all()
+        assert drawn["bodies"][0]["dense"] != drawn["bodies"][1]["dense"]
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_a_sheet_is_drawn_from_either_side(full: Report, turned: int) -> None:
+    corners = np.array([[0.0, 0, 0], [0.3, 0, 0], [0.3, 0.1, 0], [0, 0.1, 0]])
+    sheet = TriangleMesh(corners, np.array([[0, 1, 2], [0, 2, 3]])[:, ::turned], np.zeros(2, np.int64))
+    assert Page(render(replace(full, scene=scene_of_mesh(sheet)))).count("canvas") == 1
+
+
+def test_what_is_exact_or_not_fixed_has_no_distance_in_bars(full: Report, estimate: Estimate) -> None:
+    off = Truth(box(0.02, 0.03, 0.26, 4600))
+    weak = replace(estimate, identified=np.arange(10) < 4)
+    rows = re.findall(
+        r"not fixed by these data</td><td>[^<]*</td><td>([^<]*)</td>", render(replace(full, estimate=weak, truth=off))
+    )
+    assert rows == [""] * 6
+    exact = Page(render(replace(full, estimate=replace(estimate, covariance=np.zeros((10, 10))), truth=off)))
+    assert "given as exact" in exact.words
+    assert "σ" not in exact.words
+    assert "given as exact" not in Page(render(full)).words
+
+
+def test_shares_are_drawn_of_two_parts_or_more(full: Report, estimate: Estimate) -> None:
+    assert 'class="stack"' in render(full)
+    assert 'class="stack"' not in render(replace(full, estimate=replace(estimate, parts=estimate.parts[:1])))
+
+
+@pytest.mark.parametrize("truth", [-1e6, -10.0, -1.0, 0.0, 2.0, 5.0, 1e6])
+def test_the_truth_is_on_the_rail_however_far(truth: float) -> None:
+    bar = interval(0.0, 1.0, truth)
+    place = float(re.findall(r'x1="([-0-9.]+)%"[^>]*class="truth"', bar)[0])
+    assert 2 <= place <= 98
+    assert np.sign(place - 50) == np.sign(truth)
 
 
 def test_numbers_that_are_none_are_refused(full: Report) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +12,12 @@ from scipy.spatial import ConvexHull, Delaunay
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.evidence import Evidence
+from steelyard.evidence import Evidence, PartMass
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia.solids import ellipsoid
 from steelyard.report import Report, scene_of_mesh, scene_of_solid
 from steelyard.report.drawing import _magnified, drawing
+from steelyard.report.legend import viewer
 from steelyard.report.scene import pose_from_centroids
 from steelyard.report.surfaces import corner_normals, evened, part_skins, thinned
 from steelyard.shape.cloud import Cloud
@@ -122,6 +124,15 @@ def test_buffers_hold_the_surface(solid: TetMesh) -> None:
     assert body["count"] == len(index)
 
 
+def test_a_label_has_the_digits_of_the_mass_beside_the_picture(solid: TetMesh) -> None:
+    seen = replace(found((0, 0, 0), 1e-4), parts=(PartMass(0, 0.3821, 0.050, 1e-4, np.zeros(3)),))
+    report = Report("t", seen, scene_of_solid(solid, np.zeros(len(solid), int)))
+    assert report.scene is not None
+    said = drawing(report, report.scene)["bodies"][0]["says"]
+    assert said == ("382 g" if seen.mass < 1 else "0.382 kg")
+    assert "".join(re.findall(r'class="v">([^<]*)<', str(viewer(report)))) == said.split()[0]
+
+
 def test_marks_are_where_the_answer_says(solid: TetMesh) -> None:
     scene = scene_of_solid(solid, np.zeros(len(solid), int), X_SO=Pose.identity())
     marks = drawing(Report("t", found((0.01, 0.02, 0.03), 1e-4), scene), scene)["marks"]
@@ -151,6 +162,14 @@ def test_centroids_say_where_the_object_sits() -> None:
     assert pose_from_centroids(X.apply(points[:2]), points[:2]) is None
     mirrored = points * [1, 1, -1]
     assert pose_from_centroids(X.apply(points), mirrored) is None
+
+
+def test_two_parts_say_where_the_object_sits_only_where_both_frames_are_one() -> None:
+    places = np.array([[0.0, 0, 0.1], [0.02, 0, 0.2]])
+    one = pose_from_centroids(places, places)
+    assert one is not None
+    assert one.position.tolist() == [0, 0, 0]
+    assert pose_from_centroids(places, places + np.array([0, 0, 0.01])) is None
 
 
 def test_wrong_scenes_are_named(solid: TetMesh) -> None:

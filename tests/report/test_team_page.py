@@ -27,7 +27,7 @@ from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.tables.numbers import general
 from steelyard.tables.team import team_table
-from steelyard.team.estimate import GraspEstimate, TeamEstimate
+from steelyard.team.estimate import BodyEstimate, GraspEstimate, HingeEstimate, TeamEstimate
 from steelyard.team.joint import JointTeam
 
 
@@ -184,3 +184,71 @@ def test_table_and_page_show_the_same_two_figures_of_a_spread() -> None:
     assert "1000.00 ± 0.10 mm" in table
     assert '<span class="v">0.00, 0.00, 57.30</span><span class="pm"> ± 0.10</span>' in page
     assert '<span class="v">1000.00</span><span class="pm">\u202f±\u202f0.10</span>' in page
+
+
+def test_table_and_page_tell_what_each_of_two_bodies_shows_and_what_it_does_not() -> None:
+    shown = BodyEstimate(("r0",), 0.31, 0.02, np.array([0.3, 0.4, 0.0]), np.full(3, 0.01), 0.01, np.array([0.8, 2.0]))
+    nan = np.full(3, np.nan)
+    unseen = BodyEstimate(("r1", "r2"), np.nan, np.nan, nan, nan, np.nan, nan[:2])
+    hinge = HingeEstimate(np.array([0.0, 0, 1]), np.zeros(3), 0.1, 1e-3, np.deg2rad(17), (shown, unseen))
+    seen = replace(around(3), hinge=hinge)
+    lines = team_table(seen, "a team").splitlines()
+    at = lines.index("  two bodies with a hinge")
+    assert [cell.strip() for cell in re.split(" {3,}", lines[at + 2].strip())] == [
+        "held by r0", "0.310 ± 0.020 kg m²", "0.500 ± 0.010 kg m", "0.800 and 2.00 kg",
+    ]  # fmt: skip
+    assert re.split(" {3,}", lines[at + 3].strip()) == ["held by r1, r2", "not shown", "not shown", "not shown"]
+    page = html.unescape(render(team_page("a team", seen)))
+    section = page[page.index("Two bodies with a hinge") : page.index("All ten parameters")]
+    words = re.sub(r"\s+", " ", re.sub("<[^>]+>", " ", section).replace("\u202f", " ").replace("\xa0", " "))
+    assert "swung by 17° to either side" in words
+    assert "r0 0.310 ± 0.020 kg m² 0.500 ± 0.010 kg m 0.800 to 2.00 kg" in words
+    assert "r1, r2 not shown not shown not shown" in words
+    assert "10 of 17" in page
+
+
+def test_small_moments_are_told_in_small_units_and_clocks_by_their_bars() -> None:
+    light = around(2)
+    small = replace(light, parameters=InertialParameters(light.parameters.vector * 1e-2))
+    for seen, unit in ((small, "kg mm²"), (light, "kg m²")):
+        moments = [line for line in team_table(seen, "a team").splitlines() if line.startswith("    J")]
+        assert len(moments) == 3
+        assert all(line.endswith(f" {unit}") for line in moments)
+    late = replace(light, clock_offsets_s={"r0": 0.0, "r1": -0.000042}, clock_offset_std_s={"r0": 0.0, "r1": 9.4e-5})
+    assert "clock late by −0.042 ms" in render(team_page("a team", late))
+
+
+def test_no_spokes_lead_to_the_centre_of_what_is_no_body() -> None:
+    seen = around(3)
+    none = replace(seen, parameters=InertialParameters(-seen.parameters.vector))
+    with_spokes, without = (len(team_scene(each).bodies[0].vertices) for each in (seen, none))
+    assert without < with_spokes
+    assert render(team_page("no body", none))
+
+
+@pytest.mark.parametrize(("width", "turns"), [(0.06, [0.3, 0.3, 3.0]), (2e-4, [3.0, 0, 0])])
+def test_the_payload_is_seen_from_above_whether_its_grasps_span_a_plane_or_nearly_a_line(
+    width: float, turns: list[float]
+) -> None:
+    triangle = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.45, width, 0]])
+    for turn in Rotation.exp(np.random.default_rng(0).normal(size=(12, 3)) * turns).matrix:
+        places = triangle @ turn.T
+        body = InertialParameters.from_com(12.0, places.mean(0), np.eye(3))
+        view = team_scene(answer(body, {f"r{k}": Pose(Rotation.identity(), p) for k, p in enumerate(places)})).view
+        assert view is not None
+        assert view[1, 2] > 0.5
+
+
+def test_what_hands_may_have_moved_is_not_called_left_over() -> None:
+    made = simulate_team(TeamScene(EXACT, sensing="poses", kinds=("grasp", "motion"), motion_samples=300), 1)
+    kinds = [recording.kind for recording in made.log.recordings]
+    assert "grasp" in kinds
+    grasps = {name: made.truth.grasps[k] for k, name in enumerate(made.log.names)}
+    found = answer(made.truth.body, grasps)
+    alone = replace(made.log, recordings=tuple(r for r in made.log.recordings if r.kind != "grasp"))
+    whole, less = team_residuals(made.log, found), team_residuals(alone, found)
+    assert whole is not None
+    assert less is not None
+    assert len(whole.time) == len(less.time)
+    only = team_residuals(replace(made.log, recordings=made.log.recordings[kinds.index("grasp") :][:1]), found)
+    assert only is not None

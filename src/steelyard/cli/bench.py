@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import click
 
 from steelyard.bench.timing import one_thread
-from steelyard.cli.console import print_json, progress_bar, say
+from steelyard.cli.console import print_json, progress_bar, say, tell
 from steelyard.cli.groups import Group
 from steelyard.cli.options import HELP, JSON, PATH
 
@@ -34,7 +34,7 @@ def _tell(result: dict[str, Any], as_json: bool, table: Callable[[dict[str, Any]
     if as_json:
         print_json(result)
     else:
-        click.echo(table(result))
+        tell(table(result))
 
 
 @click.group(cls=Group, context_settings=HELP)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import shlex
 import sys
 from collections.abc import Callable, Sequence
@@ -14,13 +16,21 @@ import click
 
 from steelyard.errors import BadFile, BadValue
 from steelyard.tables.marks import Marks
+from steelyard.tables.printable import printable
 
+_STYLES = re.compile("(\x1b\\[(?:0|1|33)m)")  # what `STYLED` and click write for them
 STYLED = Marks(partial(click.style, bold=True), partial(click.style, fg="yellow", bold=True))
 
 
 def command_line(*words: object) -> str:
     """Return the line that runs a verb, quoted where a shell would take a word apart."""
     return shlex.join(["steelyard", *map(str, words)])
+
+
+def tell(text: str, *, nl: bool = True, err: bool = False) -> None:
+    """Print a text to be read by people; what names out of files hold beside letters is replaced, our styles stay."""
+    pieces = _STYLES.split(text)
+    click.echo("".join(piece if k % 2 else printable(piece) for k, piece in enumerate(pieces)), nl=nl, err=err)
 
 
 def print_json(value: Any) -> None:
@@ -30,7 +40,7 @@ def print_json(value: Any) -> None:
 
 def say(text: str) -> None:
     """Tell the person at the terminal something, on stderr."""
-    click.echo(text, err=True)
+    tell(text, err=True)
 
 
 def require_output(output: Path | None, what: str, suffixes: Sequence[str], *inputs: Path | None) -> None:
@@ -45,8 +55,18 @@ def require_output(output: Path | None, what: str, suffixes: Sequence[str], *inp
     for given in inputs:
         if given is not None and given.resolve() == output.resolve():
             raise BadValue(f"{output} is what is read; give {what} another name.")
+    if output.is_dir():
+        raise BadFile(f"{output}: cannot be written: a folder has this name.")
     if not output.parent.is_dir():
         raise BadFile(f"{output}: cannot be written: there is no folder {output.parent}. Make it first.")
+    if not os.access(output.parent, os.W_OK):
+        raise BadFile(f"{output}: cannot be written: you may not write into the folder {output.parent}.")
+
+
+def require_folder(folder: Path | None, what: str) -> None:
+    """Raise BadValue, before any work is done, where `folder` is a file and so no place to write `what` into."""
+    if folder is not None and folder.exists() and not folder.is_dir():
+        raise BadValue(f"{folder}: this is a file; give a folder to write {what} into.")
 
 
 @cache

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from steelyard.cli.console import STYLED, command_line, print_json, require_output, say, say_if_compiling
+from steelyard.cli.console import (
+    STYLED,
+    command_line,
+    print_json,
+    require_folder,
+    require_output,
+    say,
+    say_if_compiling,
+    tell,
+)
 from steelyard.cli.options import HELP, JSON, PATH
 
 if TYPE_CHECKING:
@@ -46,6 +55,7 @@ def demo(story: str, seed: int, output: Path | None, keep: Path | None, as_json:
     """
     page = output or Path("team.html" if story == "team" else "report.html")
     require_output(page, "a page", [".html", ".htm"])
+    require_folder(keep, "the made files")
     if story == "team":
         from steelyard.cli.demo_team import demo_team
 
@@ -93,8 +103,8 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
         print_json(result_dict(best) | extra | others)
         return
     title = f"A hammer, scanned from {len(seen.views)} views and turned slowly, made data (seed {seed})"
-    click.echo(estimate_table(best, title, seen.truth.people, _names(best, shape, seen), STYLED))
-    click.echo("\n" + click.style("The same log in four ways", bold=True) + "\n" + versus_table(answers, seen.truth))
+    tell(estimate_table(best, title, seen.truth.people, _names(best, shape, seen), STYLED))
+    tell("\n" + click.style("The same log in four ways", bold=True) + "\n" + versus_table(answers, seen.truth))
     say(f"The page with the parts in 3D: {output}")
     _say_what_is_kept(keep, log, views)
 

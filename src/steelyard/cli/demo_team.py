@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import STYLED, command_line, print_json, say, say_if_compiling
+from steelyard.cli.console import STYLED, command_line, print_json, say, say_if_compiling, tell
 
 if TYPE_CHECKING:
     from steelyard.logs.team_log import TeamLog
@@ -43,14 +43,14 @@ def demo_team(seed: int, output: Path, keep: Path | None, as_json: bool) -> None
         print_json(result_dict(best) | extra | {"paper": summary(paper, truth) | {"errors": _errors(paper, made)}})
         return
     known = Known(truth.people, made.grasps, made.late_s)
-    click.echo(
+    tell(
         team_table(best, f"Three Omnids with one payload, one clock 13 ms late; made data (seed {seed})", known, STYLED)
     )
-    click.echo("\n" + click.style("The same files in two ways", bold=True))
-    click.echo(versus_table({"joint": best, "paper": paper}, truth))
+    tell("\n" + click.style("The same files in two ways", bold=True))
+    tell(versus_table({"joint": best, "paper": paper}, truth))
     for name, found in (("joint", best), ("paper", paper)):
         off = _errors(found, made)
-        click.echo(f"  {name:5}   grasps off by {off['position_mm']:.2f} mm and {off['rotation_deg']:.3f}° on average")
+        tell(f"  {name:5}   grasps off by {off['position_mm']:.2f} mm and {off['rotation_deg']:.3f}° on average")
     say(f"The page with the payload in 3D: {output}")
     say(f"The files are in {keep}; try: {command_line('team', written)}" if keep else "Keep the files with --keep DIR.")
 

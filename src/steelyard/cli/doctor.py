@@ -9,7 +9,7 @@ from importlib import metadata
 import click
 
 from steelyard import __version__
-from steelyard.cli.console import print_json, say_if_compiling
+from steelyard.cli.console import print_json, say_if_compiling, tell
 from steelyard.cli.options import HELP, JSON
 from steelyard.errors import CannotAnswer
 
@@ -38,18 +38,16 @@ def doctor(as_json: bool) -> None:
             }
         )  # fmt: skip
     else:
-        click.echo(
-            f"steelyard {__version__}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
-        )
+        tell(f"steelyard {__version__}, Python {platform.python_version()} on {platform.system()} {platform.machine()}")
         for name in CORE:
-            click.echo(f"  {name:10s} {versions[name]}")
+            tell(f"  {name:10s} {versions[name]}")
         for name, extra in EXTRAS.items():
-            click.echo(f"  {name:10s} {versions[name] or f'not installed (optional: {extra})'}")
+            tell(f"  {name:10s} {versions[name] or f'not installed (optional: {extra})'}")
         missing = sorted({extra for name, extra in EXTRAS.items() if versions[name] is None})
         if missing:
             extra = missing[0]
-            click.echo(f"  to add one: {sys.executable} -m pip install 'steelyard[{extra}]' (in a clone '.[{extra}]')")
-        click.echo(f"  identification of a known body: worst error {error:.1e} of its size in {seconds:.2f} s")
+            tell(f"  to add one: {sys.executable} -m pip install 'steelyard[{extra}]' (in a clone '.[{extra}]')")
+        tell(f"  identification of a known body: worst error {error:.1e} of its size in {seconds:.2f} s")
     if not healthy:
         raise CannotAnswer(
             f"The known body came out wrong by {error:.2g} of its size: this installation cannot be trusted."

@@ -8,7 +8,7 @@ from typing import Any, NoReturn, cast
 
 import click
 
-from steelyard.cli.console import STYLED, print_json, require_output, say, say_if_compiling
+from steelyard.cli.console import STYLED, print_json, require_output, say, say_if_compiling, tell
 from steelyard.cli.options import HELP, PATH, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
 from steelyard.errors import BadValue, NoDescription
 
@@ -96,13 +96,13 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
         print_json(result_dict(estimate))
     else:
         title = f"{log or 'pendant'}: what the robot holds, in the sensor frame"
-        click.echo(estimate_table(estimate, title, marks=STYLED))
+        tell(estimate_table(estimate, title, marks=STYLED))
 
 
 def _show_example(error: NoDescription) -> NoReturn:
     """Print the description to start from on stdout, so that it can be sent to a file; what is said of it on stderr."""
     say(f"steelyard: {error.words}")
-    click.echo(error.example, nl=False)
+    tell(error.example, nl=False)
     say("The description alone is on standard output: save it beside the data with > log.toml, and identify that.")
     sys.exit(error.exit_status)
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
+import os
 import sys
 from importlib import import_module
 
 import click
 
 from steelyard import __version__
+from steelyard.cli.console import say
 from steelyard.cli.groups import Group
 from steelyard.cli.options import HELP
 from steelyard.errors import SteelyardError
@@ -61,10 +64,17 @@ def cli() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; one clear line on stderr for every error that is ours."""
+    """Run the command line; one clear line on stderr for every error that is ours, or of where the answer goes."""
     one_blas_thread()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a name may hold letters that this terminal does not have
     try:
-        cli(arguments, prog_name="steelyard")
+        # NO_COLOR (no-color.org): any text in it turns styles off; else click decides, by whether there is a terminal.
+        cli(arguments, prog_name="steelyard", color=False if os.environ.get("NO_COLOR") else None)
     except SteelyardError as error:
-        click.echo(f"steelyard: {error}", err=True)
+        say(f"steelyard: {error}")
         sys.exit(error.exit_status)
+    except OSError as error:
+        say(f"steelyard: {error.filename or 'standard output'}: {error.strerror}.")
+        sys.exit(SteelyardError.exit_status)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -107,7 +108,7 @@ class _Facts:
         masses, names = {}, {}
         for row in facts.get("parts", []):
             label, volume = row.get("label"), row.get("solid_volume_m3") or 0.0
-            if abs(volumes.get(label, 0.0) - volume) > _SAME_VOLUME * volume or not volume:
+            if abs(volumes.get(label, math.inf) - volume) > _SAME_VOLUME * volume:
                 continue
             names[label] = str(row.get("name") or "")
             mass = row.get("mass_kg", row.get("mass_fitted_kg"))

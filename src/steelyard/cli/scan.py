@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import STYLED, command_line, print_json, progress_bar, require_output, say_if_compiling
+from steelyard.cli.console import STYLED, command_line, print_json, progress_bar, require_output, say_if_compiling, tell
 from steelyard.cli.options import HELP, JSON, PATH
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def scan(views: Path, output: Path | None, points: int, as_json: bool) -> None:
     if as_json:
         print_json(_plain(fused, output, seconds))
     else:
-        click.echo(_table(fused, views, output, seconds))
+        tell(_table(fused, views, output, seconds))
 
 
 def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
@@ -66,7 +66,7 @@ def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
 def _table(fused: Scan, views: Path, output: Path | None, seconds: float) -> str:
     from steelyard.tables.estimate import finding_lines
 
-    cloud, n = fused.cloud, fused.table.normal
+    cloud, n = fused.cloud, fused.table.normal.round(3) + 0.0  # no minus zero
     size = " x ".join(f"{1e3 * length:.0f}" for length in cloud.xyz.max(0) - cloud.xyz.min(0))
     placed, moved = fused.placement, "as reported"
     if placed and fused.moved_m is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import STYLED, print_json, require_output, say_if_compiling
+from steelyard.cli.console import STYLED, print_json, require_output, say_if_compiling, tell
 from steelyard.cli.options import HELP, JSON, PATH
 from steelyard.findings import counted
 
@@ -38,7 +38,7 @@ def segment(scan: Path, parts: int | None, cells: str, output: Path | None, as_j
     if as_json:
         print_json(_plain(shape, output))
     else:
-        click.echo(_table(shape, scan, output))
+        tell(_table(shape, scan, output))
 
 
 def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def _table(shape: Shape, scan: Path, output: Path | None) -> str:
         "  part   volume cm^3   share   centroid mm                 colour",
     ]
     for k in range(len(made)):
-        x, y, z = 1e3 * parts.centroid[k]
+        x, y, z = (1e3 * parts.centroid[k]).round(1) + 0.0  # no minus zero
         colour = "" if made.rgb is None else "#" + "".join(f"{round(float(c)):02x}" for c in made.rgb[k])
         share = 100 * parts.volume[k] / volume
         lines.append(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from steelyard.cli.console import STYLED, print_json, require_output, say_if_compiling
+from steelyard.cli.console import STYLED, print_json, require_output, say_if_compiling, tell
 from steelyard.cli.options import HELP, PATH, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
 
 METHODS = ("joint", "paper")
@@ -36,4 +36,4 @@ def team(team: Path, data: Path | None, method: str, output: Path | None, as_jso
         print_json(result_dict(estimate))
     else:
         title = f"{team}: what the team carries, in the grasp frame of {estimate.reference}"
-        click.echo(team_table(estimate, title, marks=STYLED))
+        tell(team_table(estimate, title, marks=STYLED))

@@ -11,7 +11,7 @@ from steelyard.findings import about
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
 from steelyard.tables.estimate import columns
-from steelyard.tables.numbers import LARGE_INERTIA
+from steelyard.tables.numbers import inertia_unit
 
 _GROUPS = (("mass", slice(0, 1), 1e3, "g"), ("CoM", slice(1, 4), 1e3, "mm"), ("inertia", slice(4, 10), 1e6, "kg mm²"))
 _UNITS = {"mass": "mass_kg", "CoM": "com_m", "inertia": "inertia_com_kgm2"}
@@ -19,9 +19,7 @@ _UNITS = {"mass": "mass_kg", "CoM": "com_m", "inertia": "inertia_com_kgm2"}
 
 def versus_table(answers: Mapping[str, Estimate], truth: InertialParameters) -> str:
     """Return one row per answer: length of the error of mass, CoM and inertia about it, with the ± that it states."""
-    groups = _GROUPS
-    if float(np.abs(truth.inertia_com).max()) >= LARGE_INERTIA:
-        groups = (*_GROUPS[:2], ("inertia", slice(4, 10), 1.0, "kg m²"))
+    groups = [*_GROUPS[:2], (*_GROUPS[2][:2], *inertia_unit(float(np.abs(truth.inertia_com).max())))]
     rows = [("error (its own ±)", *(f"{name}, {unit}" for name, _, _, unit in groups), "rigid body")]
     for name, estimate in answers.items():
         found = _errors(estimate, truth)

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import command_line, print_json, progress_bar, say, say_if_compiling
+from steelyard.cli.console import command_line, print_json, progress_bar, require_folder, say, say_if_compiling, tell
 from steelyard.cli.groups import Group
 from steelyard.cli.options import HELP, JSON, PATH
-from steelyard.errors import BadValue
 from steelyard.findings import counted
 
 if TYPE_CHECKING:
@@ -75,8 +74,7 @@ def build(
     build_tool, families = (build_graded, GRADED) if graded else (build_even, FAMILIES)
     for name in tools:  # all of them before the first is written
         require(name, graded=graded)
-    if folder.exists() and not folder.is_dir():
-        raise BadValue(f"{folder}: this is a file; give a folder to write the tools into.")
+    require_folder(folder, "the tools")
     if views:
         require_images()
     jobs = [(name, k) for k in range(max(variants, 1)) for name in dict.fromkeys(tools or families)]
@@ -98,9 +96,7 @@ def build(
 def _tell(rows: list[dict[str, Any]], folder: Path, how: str, views: bool) -> None:
     """Print a line for each tool written, and the command to try next."""
     for row in rows:
-        click.echo(
-            f"{row['name']:26s} {1e3 * row['mass_kg']:7.1f} g  {counted(row['parts'], 'part'):8s}  {row['half']}"
-        )
+        tell(f"{row['name']:26s} {1e3 * row['mass_kg']:7.1f} g  {counted(row['parts'], 'part'):8s}  {row['half']}")
     say(f"{counted(len(rows), 'object folder')} in {folder} ({how}).")
     if views:
         one = folder / rows[0]["name"]

@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array, Integers
+from steelyard.evidence import PartMass
 from steelyard.identify.estimate import Estimate
 from steelyard.report.contents import Report
 from steelyard.report.palette import density_colours, hexadecimal, part_colour
 from steelyard.report.scene import Body, Scene
 from steelyard.report.surfaces import corner_normals
-from steelyard.tables.numbers import fixed, mass_unit, principal, round_step
+from steelyard.tables.numbers import fixed, mass_unit, places_of, principal, round_step
+from steelyard.tables.printable import printable
 from steelyard.team.estimate import TeamEstimate
 
 PAYLOAD, UNSEEN = 0, (158, 168, 176)  # a team's ring through the grasps, and its colour
@@ -77,11 +79,10 @@ def drawing(report: Report, scene: Scene) -> dict[str, Any]:
     rows = []
     for body in bodies:
         part = known.get(body.label)
-        factor, unit = mass_unit(report.estimate.mass)
         rows.append({
             "label": body.label,
-            "name": report.name_of(body.label)[:80],
-            "says": "" if part is None else f"{fixed(factor * part.mass, 1 if factor > 1 else 3)} {unit}",
+            "name": printable(report.name_of(body.label))[:80],
+            "says": "" if part is None else _weight(part, report.estimate.mass),
             "colour": hexadecimal(apart[body.label]),
             "dense": hexadecimal(density.get(body.label, (150, 150, 150))),
             "middle": _plain(body.vertices.mean(0)),
@@ -91,6 +92,12 @@ def drawing(report: Report, scene: Scene) -> dict[str, Any]:
         "low": _plain(frame.low), "size": frame.size, "view": _plain(frame.view), "bodies": rows,
         "points": _points(scene, frame), "marks": _marks(report.estimate, scene, frame),
     }  # fmt: skip
+
+
+def _weight(part: PartMass, whole: float) -> str:
+    """Return the mass of a part with the digits that its standard deviation leaves, in the unit of the `whole` [kg]."""
+    factor, unit = mass_unit(whole)
+    return f"{fixed(factor * part.mass, places_of(factor * part.mass, factor * part.std))} {unit}"
 
 
 def _packed(body: Body, frame: Frame) -> dict[str, Any]:
@@ -129,11 +136,18 @@ def _marks(estimate: Estimate, scene: Scene, frame: Frame) -> dict[str, Any]:
         marks |= {"grasps": _grasps(estimate, frame), "open": True}
     else:
         marks["sensor"] = {"at": [0.0, 0.0, 0.0], "axes": np.eye(3).tolist()}
-    if estimate.inertia_com is not None and estimate.parameters.validity().consistent:
-        moments, _, ways = principal(estimate)
-        squares = 5 * (moments.sum() / 2 - moments) / estimate.mass  # an even ellipsoid: I_x = m (b^2 + c^2) / 5
-        marks["ellipsoid"] = _plain((ways * np.sqrt(np.maximum(squares, 0))).T)
+    if (ellipsoid := even_ellipsoid(estimate)) is not None:
+        marks["ellipsoid"] = _plain(ellipsoid)
     return marks
+
+
+def even_ellipsoid(estimate: Estimate) -> Array | None:
+    """Return the half axes (3, 3) [m], one per row, of the even ellipsoid with this inertia; None where none has it."""
+    if estimate.inertia_com is None or not estimate.parameters.validity().consistent:
+        return None
+    moments, _, ways = principal(estimate)
+    squares = 5 * (moments.sum() / 2 - moments) / estimate.mass  # I_x = m (b^2 + c^2) / 5
+    return np.asarray((ways * np.sqrt(np.maximum(squares, 0))).T)  # of a plate, rounding may leave less than zero
 
 
 def _grasps(estimate: TeamEstimate, frame: Frame) -> dict[str, Any]:

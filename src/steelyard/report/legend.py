@@ -7,14 +7,14 @@ import numpy as np
 from steelyard.evidence import PartMass
 from steelyard.findings import counted
 from steelyard.report.contents import Report
-from steelyard.report.drawing import colours_of
+from steelyard.report.drawing import colours_of, even_ellipsoid
 from steelyard.report.markup import Html, joined, tag
 from steelyard.report.numbers import measured
 from steelyard.report.palette import hexadecimal, scale_stops
 from steelyard.report.plots import share_bar, swatch
 from steelyard.report.projection import picture
 from steelyard.report.scene import Scene
-from steelyard.tables.numbers import fixed, general, mass_unit, places_of
+from steelyard.tables.numbers import density, fixed, general, mass_unit, places_of
 from steelyard.team.estimate import TeamEstimate
 
 MOST_PARTS = 200
@@ -62,7 +62,7 @@ def _controls(report: Report, scene: Scene, known: bool) -> Html:
         team = isinstance(seen, TeamEstimate)
         frames = {"grasps": "Grasp frames"} if team else {"sensor": "Sensor frame"}
         shows = {"com": "Centre of mass", **frames, **shows}
-        if seen.inertia_com is not None:
+        if even_ellipsoid(seen) is not None:
             shows["ellipsoid"] = "Inertia ellipsoid"
     if scene.points is not None:
         shows["points"] = "Points"
@@ -116,9 +116,7 @@ def _part(report: Report, part: PartMass, colour: tuple[int, int, int], share: f
     factor, unit = mass_unit(report.estimate.mass)
     name = report.name_of(part.label)
     true = report.truth.masses.get(part.label) if report.truth is not None else None
-    said: list[object] = [
-        f"{general(1e6 * part.volume)} cm³ · {general(part.density, 2 if part.density < 1e3 else 3)} kg/m³"
-    ]
+    said: list[object] = [f"{general(1e6 * part.volume)} cm³ · {density(part)} kg/m³"]
     if part.material:
         said += [" · ", tag("b", part.material)]
     if true is not None:

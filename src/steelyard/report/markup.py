@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import html
 import json
-import unicodedata
 from typing import Any
+
+from steelyard.tables.printable import printable
 
 _LONGEST = 2000  # characters of one text; what is longer was not written for people
 _VOID = {"input", "meta", "br", "line", "rect", "circle", "path", "polygon"}
@@ -26,12 +27,7 @@ def text(value: object) -> Html:
     words = str(value)
     if len(words) > _LONGEST:
         words = words[:_LONGEST] + " …"
-    return Html(html.escape("".join("\ufffd" if _prints_nothing(c) else c for c in words)))
-
-
-def _prints_nothing(c: str) -> bool:
-    """Whether a character is a control, a turn of direction or no character at all."""
-    return unicodedata.category(c).startswith("C") and c != "\n"
+    return Html(html.escape(printable(words)))
 
 
 def tag(name: str, *children: object, **attributes: object) -> Html:

@@ -13,7 +13,16 @@ from steelyard.report.markup import Html, joined, tag
 from steelyard.report.numbers import measured
 from steelyard.report.palette import hexadecimal
 from steelyard.report.plots import interval, interval_signs, residual_plot
-from steelyard.tables.numbers import fixed, general, inertia_unit, mass_unit, places_of, principal
+from steelyard.tables.numbers import (
+    bias,
+    fixed,
+    general,
+    inertia_unit,
+    largest_inertia,
+    mass_unit,
+    places_of,
+    principal,
+)
 from steelyard.team.estimate import TeamEstimate
 
 _NUMBERS = ("mass", *"xyz", *ENTRIES)
@@ -217,11 +226,11 @@ def findings(report: Report) -> Html:
 def numbers(report: Report) -> Html:
     """Return the ten numbers with their standard deviations, and the truth where it is known."""
     seen = report.estimate
-    values, std = seen.parameters.people, seen.std
+    values, std, inertia = seen.parameters.people, seen.std, inertia_unit(largest_inertia(seen))
     true = None if report.truth is None else report.truth.body.people
     lines = []
     for k, name in enumerate(_NUMBERS):
-        factor, unit = mass_unit(seen.mass) if k == 0 else (1e3, "mm") if k < 4 else inertia_unit(_largest(values))
+        factor, unit = mass_unit(seen.mass) if k == 0 else (1e3, "mm") if k < 4 else inertia
         group = ("", "centre of mass ", "inertia ")[(k > 0) + (k > 3)]
         known = bool(seen.identified[k])
         cells = [
@@ -238,10 +247,6 @@ def numbers(report: Report) -> Html:
     place = _place(seen)
     lead = f"{place[:1].upper()}{place[1:]}; inertia about the centre of mass."
     return section("All ten parameters", table(heads, lines), name="numbers", lead=lead)
-
-
-def _largest(values: Array) -> float:
-    return float(np.abs(values[4:]).max())
 
 
 def evidence(report: Report) -> Html:
@@ -262,9 +267,9 @@ def evidence(report: Report) -> Html:
     if seen.holdout_force_N is not None and seen.holdout_torque_Nm is not None:
         said = f"{general(seen.holdout_force_N)} N, {general(seen.holdout_torque_Nm)} N m"
         rows.append(("left out", said, "error at poses that the fit never saw"))
-    torque, force = np.split(report.estimate.wrench_bias, 2)
     if report.estimate.bias_covariance.any():
-        rows.append(("sensor bias", f"{_vector(force)} N, {_vector(torque)} N m", "subtract from the raw channels"))
+        torque, force = bias(report.estimate)
+        rows.append(("sensor bias", f"{force} N, {torque} N m", "subtract from the raw channels"))
     delays = [(name, d) for name, d in report.estimate.delays_s.items() if d]
     rows += [("delay", f"{fixed(1e3 * delay, 2)} ms", name) for name, delay in delays[:_MOST]]
     items = [tag("div", tag("dt", n), tag("dd", v, tag("small", why) if why else "")) for n, v, why in rows]
@@ -282,10 +287,6 @@ def _rank(seen: Estimate) -> tuple[str, str]:
     if isinstance(seen, TeamEstimate) and seen.hinge is not None:
         return f"{seen.evidence.rank} of 17", "directions of the parameters of two bodies with a hinge that show"
     return f"{seen.evidence.rank} of 10", "directions of the ten parameters that the motion shows"
-
-
-def _vector(values: Array) -> str:
-    return "(" + ", ".join(general(float(v)) for v in values) + ")"
 
 
 def provenance(report: Report, version: str) -> Html:

@@ -12,7 +12,7 @@ from steelyard.report.drawing import PAYLOAD
 from steelyard.report.team_residuals import team_residuals
 from steelyard.report.team_scene import labels_of, team_scene
 from steelyard.spatial import Pose
-from steelyard.tables.numbers import fixed, general
+from steelyard.tables.numbers import decimals, fixed, general
 from steelyard.team.estimate import TeamEstimate
 
 
@@ -54,4 +54,5 @@ def _line(estimate: TeamEstimate, name: str) -> str:
     grasp = estimate.grasps[name]
     said = f"± {general(1e3 * float(grasp.std_m.max()), 2)} mm, ± {general(float(grasp.std_deg.max()), 2)}°"
     late = estimate.clock_offsets_s.get(name)
-    return (said if late is None else f"{said} · clock late by {fixed(1e3 * late, 1)} ms") + put_right
+    places = decimals(1e3 * estimate.clock_offset_std_s.get(name, 0.0))
+    return (said if late is None else f"{said} · clock late by {fixed(1e3 * late, places)} ms") + put_right

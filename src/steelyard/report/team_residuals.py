@@ -69,7 +69,7 @@ def _left(log: TeamLog, recording: TeamRecording, grasps: Pose, estimate: TeamEs
     wrench = total_wrench(grasps, rows.wrench)[keep]
     acceleration = classical_acceleration(change, twist)
     moved = MotionLog(wrench, down, acceleration, twist[:, :3], change[:, :3])
-    left = wrench - moved.predicted(estimate.parameters.vector) - estimate.wrench_bias
+    left = wrench - moved.predicted(estimate.parameters.vector)
     left = left - estimate.wrench_biases.get(recording.name, np.zeros(6))
     return rows.time[keep], left
 

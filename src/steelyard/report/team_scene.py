@@ -32,7 +32,7 @@ def team_scene(estimate: TeamEstimate) -> Scene:
     up = _up(places)
     loop = _loop(places, up)
     parts = [_tube(loop, _RING * size)]
-    if np.isfinite(estimate.com).all() and estimate.mass > 0:
+    if estimate.mass > 0:
         parts += [_tube(np.linspace(place, estimate.com, 3), _SPOKE * size) for place in places]
     bodies = [Body(PAYLOAD, *_joined(parts), np.zeros((0, 3), np.uint8))]
     for label, pose in enumerate(poses, 1):

@@ -10,7 +10,17 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.inertia.people import NAMES
 from steelyard.tables.marks import PLAIN, Marks
-from steelyard.tables.numbers import LARGE_INERTIA, places_of, plain, plus_minus, spread
+from steelyard.tables.numbers import (
+    bias,
+    density,
+    inertia_unit,
+    largest_inertia,
+    mass_unit,
+    places_of,
+    plain,
+    plus_minus,
+    spread,
+)
 from steelyard.tables.shown import Weighed
 
 INERTIA = NAMES[4:]
@@ -44,10 +54,9 @@ def estimate_table(
 def _body_rows(estimate: Weighed, truth: Array | None) -> list[tuple[str, str, str]]:
     """Return the rows name, value ± std, and truth."""
     values = estimate.parameters.people
-    told = np.abs(values[4:])[np.asarray(estimate.identified[4:])]
-    large = bool(told.max(initial=0.0) >= LARGE_INERTIA)
-    scales = np.repeat([1.0, 1e3, 1.0 if large else 1e6], [1, 3, 6])
-    units = ["kg"] + ["mm"] * 3 + ["kg m²" if large else "kg mm²"] * 6
+    factor, unit = inertia_unit(largest_inertia(estimate))
+    scales = np.repeat([1.0, 1e3, factor], [1, 3, 6])
+    units = ["kg"] + ["mm"] * 3 + [unit] * 6
     jackknife = estimate.evidence.jackknife_people
     rows = []
     for k, name in enumerate(NAMES):
@@ -80,16 +89,16 @@ def _part_lines(estimate: Weighed, truth: Mapping[int, tuple[str, float]]) -> li
     """Return the parts with their masses and densities, and where it is known the truth."""
     if not estimate.parts:
         return []
-    rows = []
+    rows, (factor, unit) = [], mass_unit(float(estimate.parameters.mass))
     for part in estimate.parts:
         name, known = "", ""
         if part.label in truth:
             name, mass = truth[part.label]
-            known = f"truth {1e3 * mass:.{places_of(1e3 * part.mass, 1e3 * part.std)}f}"
-        mass_cell = plus_minus(1e3 * part.mass, 1e3 * part.std, "g")
-        place = ", ".join(f"{round(1e3 * value) + 0}" for value in part.centroid)
+            known = f"truth {factor * mass:.{places_of(factor * part.mass, factor * part.std)}f}"
+        mass_cell = plus_minus(factor * part.mass, factor * part.std, unit)
+        place = ", ".join(f"{round(1e3 * value)}" for value in part.centroid)
         row = (
-            f"part {part.label} {name}".rstrip(), mass_cell, known, f"{part.density:.0f} kg/m³", f"at ({place}) mm",
+            f"part {part.label} {name}".rstrip(), mass_cell, known, f"{density(part)} kg/m³", f"at ({place}) mm",
             part.material or "",
         )  # fmt: skip
         rows.append(tuple(cell for cell, shown in zip(row, (1, 1, truth, 1, 1, 1), strict=True) if shown))
@@ -99,7 +108,6 @@ def _part_lines(estimate: Weighed, truth: Mapping[int, tuple[str, float]]) -> li
 def _evidence_lines(estimate: Weighed) -> list[str]:
     """Return bias, residuals, hold-out and method in a few lines."""
     seen = estimate.evidence
-    torque, force = np.split(estimate.wrench_bias, 2)
     explained = (
         "; leave-one-out: how much the answer moves when poses are left out"
         + (", the shape staying as it is" if estimate.parts else "")
@@ -117,16 +125,11 @@ def _evidence_lines(estimate: Weighed) -> list[str]:
             f"  left out   {seen.holdout_force_N:.3g} N, {seen.holdout_torque_Nm:.3g} N m rms when predicted unseen"
         )
     if estimate.bias_covariance.any():
-        lines.append(
-            f"  bias       force {_vector(force)} N, torque {_vector(torque)} N m (subtract from the raw channels)"
-        )
+        torque, force = map(plain, bias(estimate))
+        lines.append(f"  bias       force {force} N, torque {torque} N m (subtract from the raw channels)")
     lines += [f"  delay      {1e3 * delay:+.2f} ms  {name}" for name, delay in estimate.delays_s.items() if delay]
     lines += [f"  note       {note}" for note in estimate.notes]
     return lines
-
-
-def _vector(values: Array) -> str:
-    return "(" + ", ".join(f"{v:.4g}" for v in values) + ")"
 
 
 def finding_lines(findings: Sequence[Finding], marks: Marks = PLAIN) -> list[str]:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.evidence import PartMass
 from steelyard.inertia import forms
 from steelyard.spatial import Rotation
 from steelyard.tables.shown import Weighed
 
-LARGE_INERTIA = 0.1  # [kg m^2] from here on it is given in kg m²
+_LARGE_INERTIA = 0.1  # [kg m^2] from here on it is given in kg m²
 _MILLIONTH = 1e-6
 
 
 def decimals(std: float) -> int:
     """Return how many decimals show two figures of a standard deviation."""
-    if not np.isfinite(std) or std <= 0:
+    if not std > 0:
         return 3
     rounded = float(f"{std:.1e}")  # 0.0999 is shown as 0.10, not as 0.100
     return int(np.clip(1 - np.floor(np.log10(rounded)), 0, 9))
@@ -24,7 +25,7 @@ def decimals(std: float) -> int:
 def round_step(top: float) -> float:
     """Return the largest of 1, 2, 5 times a power of ten that is not above `top`."""
     power = 10.0 ** np.floor(np.log10(top))
-    return float(power * max(step for step in (1, 2, 5) if step * power <= top * (1 + 1e-9)))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= top))
 
 
 def fixed(value: float, places: int) -> str:
@@ -57,6 +58,21 @@ def spread(std: float) -> str:
     return fixed(std, decimals(std))
 
 
+def density(part: PartMass) -> str:
+    """Return the density of a part [kg/m³] as a whole number, rounded to two figures of its standard deviation."""
+    std = part.std / part.volume
+    places = min(1 - int(np.floor(np.log10(std))), 0) if std > 0 else 0
+    return f"{round(part.density, places):.0f}"
+
+
+def bias(estimate: Weighed) -> tuple[str, str]:
+    """Return the sensor's bias, torque [N m] and force [N], each entry with two figures of its standard deviation."""
+    stds = np.sqrt(np.diagonal(estimate.bias_covariance))
+    pairs = zip(estimate.wrench_bias.tolist(), stds.tolist(), strict=True)
+    shown = [fixed(value, places_of(value, std)) for value, std in pairs]
+    return f"({', '.join(shown[:3])})", f"({', '.join(shown[3:])})"
+
+
 def mass_unit(mass: float) -> tuple[float, str]:
     """Return factor and unit for a mass [kg]: grams below one kilogram."""
     return (1e3, "g") if abs(mass) < 1 else (1.0, "kg")
@@ -64,7 +80,13 @@ def mass_unit(mass: float) -> tuple[float, str]:
 
 def inertia_unit(moment: float) -> tuple[float, str]:
     """Return factor and unit for a moment of inertia [kg m^2]."""
-    return (1e6, "kg mm²") if abs(moment) < LARGE_INERTIA else (1.0, "kg m²")
+    return (1e6, "kg mm²") if abs(moment) < _LARGE_INERTIA else (1.0, "kg m²")
+
+
+def largest_inertia(estimate: Weighed) -> float:
+    """Return the largest entry [kg m^2] of the inertia about the centre of mass that the data fix; 0 without any."""
+    told = estimate.parameters.people[4:][np.asarray(estimate.identified[4:])]
+    return float(np.abs(told).max(initial=0.0))
 
 
 def rpy_deg(rotation: Rotation) -> Array:
@@ -73,10 +95,11 @@ def rpy_deg(rotation: Rotation) -> Array:
 
 
 def plus_minus(value: float, std: float, unit: str) -> str:
-    """Return 'value ± std unit' with two figures of the standard deviation."""
+    """Return 'value ± std unit' with two figures of the standard deviation; of an exact value there is no ±."""
     if not np.isfinite(std):
         return f"{value:.4g} ± ? {unit}"
-    return plain(f"{fixed(value, places_of(value, std))} ± {spread(std)} {unit}")
+    bar = f" ± {spread(std)}" if std > 0 else ""
+    return plain(f"{fixed(value, places_of(value, std))}{bar} {unit}")
 
 
 def plain(text: str) -> str:

@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.spatial import Pose
 from steelyard.tables.estimate import columns, estimate_table
 from steelyard.tables.marks import PLAIN, Marks
-from steelyard.tables.numbers import decimals, general, plus_minus, principal, rpy_deg
+from steelyard.tables.numbers import decimals, general, inertia_unit, plus_minus, principal, rpy_deg
 from steelyard.tables.shown import Carried
 
 
@@ -44,7 +44,8 @@ def _principal_lines(estimate: Carried) -> list[str]:
     if estimate.inertia_com is None:
         return []
     moments, std, _ = principal(estimate)
-    rows = [(f"J{k + 1}", plus_minus(float(moments[k]), float(std[k]), "kg m²")) for k in range(3)]
+    factor, unit = inertia_unit(float(moments.max()))
+    rows = [(f"J{k + 1}", plus_minus(factor * float(moments[k]), factor * float(std[k]), unit)) for k in range(3)]
     return ["", "  principal moments of inertia", columns([(f"  {name}", said) for name, said in rows])]
 
 

@@ -306,8 +306,10 @@
     for (const body of bodies) body.chip.hidden = !(show.chips && body.shown && (shown.length <= 12 || lit === body.label));
     for (const body of shown) {
       if (body.chip.hidden) continue;
-      const [x, y] = onScreen(seen, add(body.middle, offset(body)));
+      const [at, y] = onScreen(seen, add(body.middle, offset(body)));
       const [w, h] = [body.chip.offsetWidth, body.chip.offsetHeight];
+      const wide = chips.clientWidth;  // a name is whole at the picture's edge too, and leaves with its part
+      const x = at < 0 || at > wide ? at : Math.max(w / 2, Math.min(at, wide - w / 2));
       let top = y + 16;
       while (taken.some(([l, t, r]) => x - w / 2 < r && x + w / 2 > l && Math.abs(t - top) < h + 2)) top += 3;
       taken.push([x - w / 2, top, x + w / 2]);
