@@ -61,7 +61,7 @@ def spread(std: float) -> str:
 def density(part: PartMass) -> str:
     """Return the density of a part [kg/m³] as a whole number, rounded to two figures of its standard deviation."""
     std = part.std / part.volume
-    places = min(1 - int(np.floor(np.log10(std))), 0) if std > 0 else 0
+    places = min(1 - int(np.floor(np.log10(std))), 0) if 0 < std < np.inf else 0
     return f"{round(part.density, places):.0f}"
 
 
