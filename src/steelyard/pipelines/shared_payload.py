@@ -20,6 +20,7 @@ from steelyard.identify.fit import within_numbers
 from steelyard.identify.scale import allow_scale
 from steelyard.logs.recording import STANDARD_GRAVITY
 from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.logs.team_steady import with_steady_tracks
 from steelyard.pipelines.lacking import missing_rows, missing_wrenches, repeated_rows
 from steelyard.pipelines.telling import MISREAD
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
@@ -59,6 +60,7 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_one_length_unit(log)
     require_own_numbers(log)
     log, moving = with_moves_as_motion(log)
+    log, steady = with_steady_tracks(log) if method == "joint" else (log, ())
     log, apart = together(log) if method == "joint" else (log, NOTHING)
     for recording in log.recordings:
         recording.require_overlap()
@@ -67,7 +69,7 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     found = _with_clocks(ESTIMATORS[method].identify(whole), apart, log)
     lost = (*repeated_rows(log), *missing_rows(log), *missing_wrenches(log, _weighing(log, method)))
     seen = (*stuck_forces(log), *frozen, *clipped, *found.findings, *lost)
-    found = replace(found, findings=seen, notes=(*moving, *found.notes)).by_cause()
+    found = replace(found, findings=seen, notes=(*steady, *moving, *found.notes)).by_cause()
     return _weighed(_with_gravity(_remedied(found), log))
 
 
