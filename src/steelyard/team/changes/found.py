@@ -112,7 +112,10 @@ def _without_slips(
         fallen = float(np.log(before.fit.noise / team.fit.noise).mean())
         if before.rough and team.rough and found.between and fallen < np.log(BETTER):
             break
-        slips.append(team.measured(log, found.beside(slips)))
+        slip = team.measured(log, found.beside(slips))
+        if slip is None:
+            break
+        slips.append(slip)
     if not slips:
         return replace(given, clocks_left=left)
     team = fitted(edited(edit, slips))
