@@ -34,6 +34,7 @@ from steelyard.team.misread.files import (
     require_own_numbers,
     with_moves_as_motion,
 )
+from steelyard.team.misread.home_axes import with_grasp_axes
 from steelyard.team.published import PublishedTeam
 from steelyard.team.team_findings import late_clocks
 from steelyard.team.weighed import clocked
@@ -66,11 +67,17 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
         recording.require_overlap()
     live, frozen = without_frozen(log)
     whole, clipped = without_clipped(live)
-    found = _with_clocks(ESTIMATORS[method].identify(whole), apart, log)
+    found = _with_clocks(_identified(whole, method), apart, log)
     lost = (*repeated_rows(log), *missing_rows(log), *missing_wrenches(log, _weighing(log, method)))
     seen = (*stuck_forces(log), *frozen, *clipped, *found.findings, *lost)
     found = replace(found, findings=seen, notes=(*steady, *moving, *found.notes)).by_cause()
     return _weighed(_with_gravity(_remedied(found), log))
+
+
+def _identified(log: TeamLog, method: Method) -> TeamEstimate:
+    """Return what a method says of the log; the joint one also asks whether wrenches are in other axes."""
+    identify = ESTIMATORS[method].identify
+    return with_grasp_axes(log, identify) if method == "joint" else identify(log)
 
 
 def _weighing(log: TeamLog, method: Method) -> tuple[TeamRecording, ...]:
