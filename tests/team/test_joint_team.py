@@ -21,6 +21,7 @@ from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import log as pose_log
 from steelyard.team.assembled import consistent
+from steelyard.team.changes.slips import Slip as SlipFound
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.team import PoseTeam
@@ -210,6 +211,12 @@ def test_a_slip_is_found_timed_and_isolated() -> None:
 def test_no_slip_without_one() -> None:
     for seed in range(6):
         assert "grasp-slipped" not in JointTeam().identify(trial(seed=seed).log).codes()
+
+
+def test_a_slip_that_is_gone_without_what_follows_it_is_none() -> None:
+    made = trial(kinds=("motion",))
+    team = PoseTeam.of(made.log, clocks=True)
+    assert team.measured(made.log, SlipFound(1, 0, 7.0, np.full(6, 0.1), 100.0)) is None
 
 
 def test_a_robot_that_leaves_is_told_from_one_whose_data_are_missing() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import GRAVITY, Presence, Slip, TeamNoise, TeamScene
+from steelyard.spatial import Pose, Rotation
+from steelyard.team.changes.found import Edit, _asked
 from steelyard.team.changes.presence import EDGE_S, let_go, strayers
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
-from steelyard.team.stacked import stretches
+from steelyard.team.stacked import Stretch, stretches
 
 NOISE = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.3, torque_white_Nm=0.03)
 GRIPPER, LEAVES, WHO = 0.8, 8.0, 2
@@ -151,3 +154,24 @@ def test_a_step_while_a_robot_bears_little_is_no_way_of_its_own() -> None:
     rests = np.where(time % 3.0 < 1.5, 30.0 * np.sin(6.0 * time) + 40.0, 40.0)
     off = [np.stack([rests, slipped, rests], axis=1)]
     assert strayers(parts, light, off).tolist() == [False, False, True]
+
+
+def test_who_bears_more_before_another_joins_leaves_rows_to_tell_it() -> None:
+    """Of two, each pushes with little while the other bears most: hardly a row is left of both."""
+    rows = 2000
+    held = np.ones((rows, 2), np.bool_)
+    poses = Pose(Rotation.identity(rows, 2), np.zeros((rows, 2, 3)))
+    part = Stretch("one", "motion", np.arange(rows) / 100, poses, held, np.zeros((rows, 2, 6)), held, held)
+    light = np.arange(rows)[:, None] < [1010, 0]
+    light[1000:, 1] = True
+    asked = list[tuple[int, ...]]()
+
+    def fitted(edit: Edit) -> SimpleNamespace:
+        unseen = (~edit((part,))[0].seen).sum(0)
+        asked.append(tuple(unseen.tolist()))
+        return SimpleNamespace(fit=SimpleNamespace(noise=np.array([2.0 if unseen[0] else 1.0])))
+
+    found = _asked((part,), (light,), fitted)  # type: ignore[type-var]
+    assert asked == [(1010, 0), (0, 1000)]
+    assert found is not None
+    np.testing.assert_array_equal(found[0][0], light & [False, True])

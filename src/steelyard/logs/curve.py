@@ -7,12 +7,15 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.logs.clock import sampling_rate
 from steelyard.logs.runs import around
 
 # Samples farther apart than so many median steps have a gap between them.
 BRIDGED = 2.5
+# Of samples nearer than so many of these the first is taken: stamps err by as much, and a slope through both would be
+# noise many times over.
+_CLOSE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,14 @@ class Curve:
         """
         from scipy.interpolate import PchipInterpolator
 
-        steps, values = np.diff(known), np.ascontiguousarray(values, dtype=np.float64)
+        values = np.ascontiguousarray(values, dtype=np.float64)
+        steps = np.diff(known)
+        least = _CLOSE * float(np.median(steps))
+        # Stamps of a clock that is taken for another's may fall.
+        if 0 < steps.min() < least:
+            apart = _apart(known, least)
+            known, values = known[apart], values[apart]
+            steps = np.diff(known)
         gap = steps > BRIDGED * np.median(steps)
         monotone = around(gap) | (len(known) < 4)
         slope = np.empty_like(values) if monotone.all() else _slopes(known, values)
@@ -58,6 +68,17 @@ class Curve:
     def at(self, time: Array) -> Array:
         """Return the values (M, D) at `time` (M,) [s]; beyond the ends those are held."""
         return np.asarray(_hermite(self.known, self.values, self.slope, np.clip(time, self.start, self.end)))
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _apart(known: Array, least: float) -> Mask:
+    """Return the samples (T,) that are at least so far [s] behind the last of these before them."""
+    out, last = np.ones(len(known), np.bool_), known[0]
+    for t in range(1, len(known)):
+        out[t] = known[t] - last >= least
+        if out[t]:
+            last = known[t]
+    return out
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -33,14 +33,17 @@ _MEAN_OF, _WHITE = 20, 2.0
 
 def with_steady_stamps(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     """Return the recording with stamps evened where its numbers are smoother so, and a note on each such stream."""
-    streams, notes = [], []
-    for stream in recording.streams:
-        prompt = _prompt(stream)
-        even = _steadied(prompt)
-        streams.append(even)
-        notes += _words(stream, prompt, even)
+    steady = [steadied(stream) for stream in recording.streams]
+    streams, notes = tuple(stream for stream, _ in steady), tuple(note for _, said in steady for note in said)
     changed = any(a is not b for a, b in zip(recording.streams, streams, strict=True))
-    return (replace(recording, streams=tuple(streams)) if changed else recording), tuple(notes)
+    return (replace(recording, streams=streams) if changed else recording), notes
+
+
+def steadied(stream: Stream) -> tuple[Stream, tuple[str, ...]]:
+    """Return the stream with stamps evened where its numbers are smoother so, and notes on what was done."""
+    prompt = _prompt(stream)
+    even = _evened(prompt)
+    return even, tuple(_words(stream, prompt, even))
 
 
 def _words(given: Stream, prompt: Stream, even: Stream) -> list[str]:
@@ -79,7 +82,7 @@ def _prompt(stream: Stream) -> Stream:
     return replace(stream, time=sampled[best]) if rises and shares[best] < _ROUGHER else stream
 
 
-def _steadied(stream: Stream) -> Stream:
+def _evened(stream: Stream) -> Stream:
     """Return the stream at a steady rate where its numbers are plainly smoother so."""
     time = _uneven(stream)
     if time is None:

@@ -20,6 +20,7 @@ from steelyard.identify.fit import within_numbers
 from steelyard.identify.scale import allow_scale
 from steelyard.logs.recording import STANDARD_GRAVITY
 from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.logs.team_steady import with_steady_tracks
 from steelyard.pipelines.lacking import missing_rows, missing_wrenches, repeated_rows
 from steelyard.pipelines.telling import MISREAD
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
@@ -33,6 +34,7 @@ from steelyard.team.misread.files import (
     require_own_numbers,
     with_moves_as_motion,
 )
+from steelyard.team.misread.home_axes import with_grasp_axes
 from steelyard.team.published import PublishedTeam
 from steelyard.team.team_findings import late_clocks
 from steelyard.team.weighed import clocked
@@ -59,16 +61,23 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_one_length_unit(log)
     require_own_numbers(log)
     log, moving = with_moves_as_motion(log)
+    log, steady = with_steady_tracks(log) if method == "joint" else (log, ())
     log, apart = together(log) if method == "joint" else (log, NOTHING)
     for recording in log.recordings:
         recording.require_overlap()
     live, frozen = without_frozen(log)
     whole, clipped = without_clipped(live)
-    found = _with_clocks(ESTIMATORS[method].identify(whole), apart, log)
+    found = _with_clocks(_identified(whole, method), apart, log)
     lost = (*repeated_rows(log), *missing_rows(log), *missing_wrenches(log, _weighing(log, method)))
     seen = (*stuck_forces(log), *frozen, *clipped, *found.findings, *lost)
-    found = replace(found, findings=seen, notes=(*moving, *found.notes)).by_cause()
+    found = replace(found, findings=seen, notes=(*steady, *moving, *found.notes)).by_cause()
     return _weighed(_with_gravity(_remedied(found), log))
+
+
+def _identified(log: TeamLog, method: Method) -> TeamEstimate:
+    """Return what a method says of the log; the joint one also asks whether wrenches are in other axes."""
+    identify = ESTIMATORS[method].identify
+    return with_grasp_axes(log, identify) if method == "joint" else identify(log)
 
 
 def _weighing(log: TeamLog, method: Method) -> tuple[TeamRecording, ...]:

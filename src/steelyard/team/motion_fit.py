@@ -122,8 +122,11 @@ class MotionFit(ABC):
         within = clearest(find_slip(k, part, moved, noise, self.drifts) for k, (part, moved) in each)
         return self._slip_between(log, parts, apart) if within is None else within
 
-    def measured(self, log: TeamLog, found: Slip) -> Slip:
-        """Return a slip with time and step by this fit, which was made without what follows it."""
+    def measured(self, log: TeamLog, found: Slip) -> Slip | None:
+        """Return a slip with time and step by this fit, which was made without what follows it; None where it is gone.
+
+        What it was found by may have bent the fit that it was found in.
+        """
         # Between recordings of twists, fits to what is before and after have told it.
         if found.between and self.drifts:
             return found
@@ -132,7 +135,8 @@ class MotionFit(ABC):
             return step_between(found, [part for part, _ in every], [left for _, left in every])
         part, left = every[found.recording]
         noise = noise_alone(self.J, self.W)[found.robot]
-        return found.renewed(part, self._places(left[:, found.robot], part), noise, self.drifts)
+        slip = found.renewed(part, self._places(left[:, found.robot], part), noise, self.drifts)
+        return slip if slip.large else None
 
     def _places(self, left: Array, part: Stretch) -> Array:
         """Return how far grasps are off (T, ..., 6) by their residuals."""

@@ -31,6 +31,8 @@ MOST_SLIPS = 3
 BETTER = 3.0
 
 Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
+# Fewer seconds in which two robots surely hold the payload tell nothing of who goes ways of its own.
+FEW_S = 2.0
 # Residuals of forces times those of torques, beside the other explanation's, from which on the wrenches tell.
 TOLD = 1.25
 DOUBT = "It may have been the other robot's: of two, only wrenches tell, and not here."
@@ -48,7 +50,7 @@ def without_changes(
     bare, light = idle(raw, SHARE), idle(raw, LIGHT)
     given = None if any(rows.any() for rows in bare) else fitted(_unchanged)
     # One who goes ways of its own makes a rough fit; else who pushes with little merely does.
-    asked = None if given is not None and not given.rough else _asked(light, fitted)
+    asked = None if given is not None and not given.rough else _asked(raw, light, fitted)
     if asked is None:
         given = fitted(_unchanged) if given is None else given
         return _without_slips(log, clocks, given, fitted, _unchanged, other)
@@ -65,7 +67,9 @@ def without_changes(
     return replace(team, findings=(*found, *team.findings))
 
 
-def _asked(light: Sequence[Mask], fitted: Callable[[Edit], F]) -> tuple[Sequence[Mask], F] | None:
+def _asked(
+    raw: Sequence[Stretch], light: Sequence[Mask], fitted: Callable[[Edit], F]
+) -> tuple[Sequence[Mask], F] | None:
     """Return rows (T, N) in which robots that push with little may have let go, and the fit without those poses.
 
     All robots' rows; where too little is left without them, those of the robot without whom the others agree best, as
@@ -73,8 +77,10 @@ def _asked(light: Sequence[Mask], fitted: Callable[[Edit], F]) -> tuple[Sequence
     """
     if not any(rows.any() for rows in light):
         return None
-    with suppress(*FAILURES):
-        return light, fitted(partial(_unseen, rows=light))
+    sure = (((p.seen & ~r).sum(1) > 1).sum() / p.rate for p, r in zip(raw, light, strict=True) if len(p) > 1)
+    if sum(sure) >= FEW_S:
+        with suppress(*FAILURES):
+            return light, fitted(partial(_unseen, rows=light))
     best: tuple[Sequence[Mask], F] | None = None
     for robot in np.flatnonzero(np.any([rows.any(0) for rows in light], axis=0)):
         own = [rows & (np.arange(rows.shape[1]) == robot) for rows in light]
@@ -112,7 +118,10 @@ def _without_slips(
         fallen = float(np.log(before.fit.noise / team.fit.noise).mean())
         if before.rough and team.rough and found.between and fallen < np.log(BETTER):
             break
-        slips.append(team.measured(log, found.beside(slips)))
+        slip = team.measured(log, found.beside(slips))
+        if slip is None:
+            break
+        slips.append(slip)
     if not slips:
         return replace(given, clocks_left=left)
     team = fitted(edited(edit, slips))

@@ -175,7 +175,7 @@ class TwistTeam(MotionFit):
         if not any(_down(part, grasps)[1].any() for part in self.parts):
             raise CannotAnswer(
                 "somebody must know where gravity points: give a gravity channel of a robot whose base moves, or "
-                "[team] gravity for a level base that stands."
+                "[team] gravity for a level base that stands. An accelerometer (specific_force) is not taken for it."
             )
         return out, into @ covariance @ into.T
 
