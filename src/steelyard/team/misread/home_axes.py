@@ -26,6 +26,8 @@ ASKS = {"wrench-unexplained", "force-unit", "wrench-sign-flipped"}
 # What is left of forces times what is left of torques must fall by the first factor, and be less than with the next
 # best by the second.
 FALLS, CLEAR = 4.0, 2.0
+# Each costs a fit: of more robots than this only all together are tried.
+_MOST = 8
 
 Identify = Callable[[TeamLog], TeamEstimate]
 
@@ -71,7 +73,8 @@ def _suspects(log: TeamLog) -> Iterator[tuple[str, ...]]:
         for name in log.names
         if log.has_wrench(name) and all(t.has("rotation") for _, t in log.tracks_of(name) if t.has("force"))
     )
-    yield from ((name,) for name in names)
+    if len(names) <= _MOST:
+        yield from ((name,) for name in names)
     if len(names) > 1:
         yield names
 
