@@ -48,8 +48,9 @@ UNLIKE_ONE_BODY = {"motion-mismatch", "weight-compensated"}
 Spans = tuple[tuple[float, float], ...]
 # So often clocks are found anew without the time of a hand.
 HANDS = 2
-# So often play of the sensor is found, with clocks anew, where it leaves less than this share of what lasts a second.
-PLAYS, MAYBE = 6, 0.7
+# So often play of the sensor is found, with clocks anew, from so many standard deviations on where it leaves less than
+# this share of what lasts a second.
+PLAYS, LIKELY, MAYBE = 6, 2.0, 0.7
 # A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where a part
 # of the log, no smaller than that, leaves less than so much of it. Where one was found, clocks without it may leave so
 # many times as much.
@@ -176,7 +177,7 @@ class Reading:
         if rows.unmeasured or self.left_in or stands_aside("room bias", self.before):
             return None
         found = play(rows.log, rows.aligned.log, self.recording, drift)
-        if found is None or found.slowly > MAYBE * lasts(rows.log, drift):
+        if found is None or found.times < LIKELY or found.slowly > MAYBE * lasts(rows.log, drift):
             return None
         return found
 
