@@ -28,6 +28,7 @@ from steelyard.sanity.fitted.yielding import allow_filter, allow_sag, allow_soft
 UNTARED = 1e-6
 # Where an acceleration comes from that does not see the arm's structure bend.
 ENCODERS = ("position", "linear_velocity")
+MAYBE_PLAY = "the sensor may have play where a delay was found: the bars hold the difference"
 
 
 def looked_back(
@@ -60,17 +61,23 @@ def corrections_allowed(load: Load, estimate: Estimate, rows: FitRows) -> Estima
     """Return the estimate with bars that hold how well that is known which the rows are without: a bias that keeps its
     direction in the room, play of the sensor, and gravity's own direction where that was estimated.
 
-    How a sensor's loop runs between its turns no log tells: bars hold all that its play moves the answer by.
+    How a sensor's loop runs between its turns no log tells, nor what those who calibrated it took for its gain: bars
+    hold all that its play moves the answer by, and that of each channel alone. Where it may be a delay as well they
+    hold the difference.
     """
     log, rotation = load.log, rotation_of(load.log, rows.aligned)
     others: list[MotionLog] = []
     if rows.play is not None:
-        others.append(rows.play.back(log))
+        others += [play.back(log) for play in (rows.play, *rows.play.by_channel)]
+    if rows.unplayed is not None:
+        others.append(rows.unplayed)
     if rotation is not None:
         biases = () if rows.room is None else rows.room.bias.errors()
         pulls = () if rows.level is None else rows.level.within
         others += [without(error, log, rotation) for error in biases]
         others += [levelled(log, rotation, gravity, rows.aligned.acceleration_from) for gravity in pulls]
+    if rows.unplayed is not None:
+        estimate = estimate.noted(MAYBE_PLAY)
     return estimate.allowing(*(load.of(other).parameters.vector - estimate.parameters.vector for other in others))
 
 

@@ -48,9 +48,9 @@ UNLIKE_ONE_BODY = {"motion-mismatch", "weight-compensated"}
 Spans = tuple[tuple[float, float], ...]
 # So often clocks are found anew without the time of a hand.
 HANDS = 2
-# So often play of the sensor is found, with clocks anew, where it leaves less than the second share of what lasts a
-# second, and less than the first beside the delays that were found.
-PLAYS, HINT, MAYBE = 8, 0.96, 0.8
+# So often play of the sensor is found, with clocks anew, from so many standard deviations on where it leaves less than
+# this share of what lasts a second.
+PLAYS, LIKELY, MAYBE = 6, 2.0, 0.7
 # A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where a part
 # of the log, no smaller than that, leaves less than so much of it. Where one was found, clocks without it may leave so
 # many times as much.
@@ -71,6 +71,7 @@ class FitRows:
     maybe       the same where that is not beyond doubt: the rows are those of the origin
     room        a bias that keeps its direction in the room, which the rows are without
     play        play of the sensor, which the rows are without
+    unplayed    rows without play, where what one body leaves may be play as well as a delay
     units       findings that forces and torques do not belong together, where such a point would be no point
     """
 
@@ -85,6 +86,7 @@ class FitRows:
     units: tuple[Finding, ...] = ()
     room: SeenRoomBias | None = None
     play: Play | None = None
+    unplayed: MotionLog | None = None
 
     @property
     def kept(self) -> float:
@@ -152,7 +154,7 @@ class Reading:
 
     def _by_turns(self, rows: FitRows, found: Play) -> tuple[Recording, FitRows]:
         """Return recording and rows without play, sought from `found` on by turns with delays; else as they are."""
-        drift, steps = self.options.drift, list[Array]()
+        drift = self.options.drift
         for _ in range(PLAYS):
             right = replace(self, recording=found.put_right(self.recording))
             again = right.rows_to_fit()
@@ -161,28 +163,23 @@ class Reading:
             if now is None:
                 break
             if now.like(found):
-                sure = now.explains(log, lasts(rows.log, drift), drift)
-                return (right.recording, replace(again, play=now)) if sure else (self.recording, rows)
-            steps, found = [*steps[-1:], now.half - found.half], now
-            if len(steps) == 2:
-                # Delays and play are found by turns, and what one takes for the other goes by the same share each time.
-                found, steps = found.moved(*steps), []
+                if not now.best(log, drift):
+                    break
+                if now.sure(lasts(rows.log, drift)):
+                    return right.recording, replace(again, play=now)
+                return self.recording, replace(rows, unplayed=again.log)
+            found = now
         return self.recording, rows
 
     def _play(self, rows: FitRows) -> Play | None:
-        """Return the play that rows may show, or the same rows with clocks as stamped: play passes for a delay."""
-        drift, recording = self.options.drift, self.recording
+        """Return the play that rows may show; None where they show none, or may not be judged."""
+        drift = self.options.drift
         if rows.unmeasured or self.left_in or stands_aside("room bias", self.before):
             return None
-        found, slow = play(rows.log, rows.aligned.log, recording, drift), lasts(rows.log, drift)
-        if found is None or not found.shows or found.slowly > HINT * slow:
+        found = play(rows.log, rows.aligned.log, self.recording, drift)
+        if found is None or found.times < LIKELY or found.slowly > MAYBE * lasts(rows.log, drift):
             return None
-        if any(rows.aligned.delays_std_s.values()):
-            stamped, _ = self._aligned(AlignOptions(estimate_delays=False))
-            held = self._held(FitRows(stamped.log, stamped, None, (), ()))
-            other = play(held.log, stamped.log, recording, drift)
-            found = found if other is None else min(found, other, key=lambda one: one.slowly)
-        return found if found.slowly < MAYBE * slow else None
+        return found
 
     def _placed(self, place: Misplaced) -> tuple[FitRows, AlignOptions]:
         """Return the rows with accelerations of S, where they were of another point, and how they were aligned.

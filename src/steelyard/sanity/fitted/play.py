@@ -1,7 +1,9 @@
 """Play of a sensor: its reading follows the load only once that has moved on by a half width; hysteresis, stiction.
 
-While a channel's load rises the reading is too low by the half width, while it falls too high, and after a turn it
-stays where it was until the load has crossed the play. In one motion that looks like a delay; over many it does not.
+While a channel's load rises the reading is too low, while it falls too high, and after a turn it stays behind until the
+load has crossed the play. Real loops bend as plays of many widths in parallel do (Prandtl and Ishlinskii), each with a
+share of its own that is not negative. In one motion that looks like a delay; what a delay does grows with speed, what
+play does hangs on the way alone: they are fitted together.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.findings import Finding
 from steelyard.inertia.regressor import design
 from steelyard.logs.log import MotionLog
@@ -23,15 +25,15 @@ from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
 from steelyard.sanity.words import shortly
 from steelyard.spatial import cross_matrix
 
-# Half widths are sought from this share of a channel's range on, and fitted anew so often.
-START, ROUNDS = 0.005, 4
-# No channel plays by less than the first or more than the second share of its range.
-LEAST, MOST = 5e-4, 0.05
+# Half widths of the plays in parallel, as shares of a channel's range.
+WIDTHS = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
+# The load that they hang on is fitted anew so often.
+ROUNDS = 2
 # It is sure beyond so many standard deviations, by leaving out stretches, where it leaves so much less of what lasts
-# for a second: sound, late and filtered wrenches keep 0.97 of it. From the third on it is looked for closer.
-SURE, SLOWLY, MAYBE = 8.0, 0.5, 3.0
-MOST_SHARE = 0.85  # of a step that the next may still be: those that follow are made at once
-SETTLED = 1.0  # standard deviations: half widths that change by less are found
+# for a second: sound, late and filtered wrenches keep 0.97 of it.
+SURE, SLOWLY = 4.0, 0.5
+# What a loop is off by is found where it changes by less than so many standard deviations, or by this share.
+SETTLED, ALIKE = 1.0, 0.02
 REMEDY = "Reach poses from either side, so that it averages out, or weigh with a sensor that has less hysteresis."
 
 
@@ -39,9 +41,9 @@ REMEDY = "Reach poses from either side, so that it averages out, or weigh with a
 class Play:
     """Play of the channels of a wrench, as they are read.
 
-    half, std  (6,) half widths and their standard deviations [tau N m, f N]
+    half, std  (6,) what a reading is off by once all its plays are crossed, and standard deviations [tau N m, f N]
     time       (N,) [s] on the wrench clock
-    behind     (N, 6) by how many half widths a reading is off
+    off        (N, 6) what a reading is off by [tau N m, f N]
     to_sensor  (6, 6) what channels as read are in S, as applied to the object
     left       squared residual beside that without play
     slowly     squares that last for a second
@@ -50,43 +52,33 @@ class Play:
     half: Array
     std: Array
     time: Array
-    behind: Array
+    off: Array
     to_sensor: Array
     left: float
     slowly: float
 
     @property
-    def shows(self) -> bool:
-        """Whether a channel plays, or seems to run ahead of its load, as where a delay was found in place of play."""
-        return bool((np.abs(self.half) > MAYBE * self.std).any())
+    def times(self) -> float:
+        """How many standard deviations the surest channel plays by."""
+        return float((self.half / np.maximum(self.std, 1e-300)).max())
 
     @property
-    def sure(self) -> bool:
-        """Whether a channel plays beyond doubt, and none runs ahead of its load."""
-        times = self.half / np.maximum(self.std, 1e-300)
-        return bool(times.max() > SURE and times.min() > -SURE / 2)
+    def by_channel(self) -> tuple[Play, ...]:
+        """The play of each channel alone."""
+        return tuple(replace(self, off=self.off * one) for one in np.eye(6))
 
-    def explains(self, log: MotionLog, slow: float, drift: bool) -> bool:
-        """Whether it leaves far less of what lasts for a second than `slow`, which no play leaves, and less than a
-        turned sensor, unlike gains or another point do in the log as it was read.
-        """
+    def sure(self, slow: float) -> bool:
+        """Whether it surely is play: it leaves far less of what lasts for a second than `slow`, which none leaves."""
+        return self.times > SURE and self.slowly <= SLOWLY * slow
+
+    def best(self, log: MotionLog, drift: bool) -> bool:
+        """Whether it leaves less than a turned sensor, unlike gains or another point do in the log as it was read."""
         others = sensor_matrix(log, drift), misplaced(log, drift)
-        best = all(other is None or self.left < other.left for other in others)
-        return self.sure and self.slowly <= SLOWLY * slow and best
+        return all(other is None or self.left < other.left for other in others)
 
     def like(self, other: Play) -> bool:
         """Whether another play is the same but for what either may be off by."""
-        return bool((np.abs(self.half - other.half) <= SETTLED * self.std).all())
-
-    @property
-    def width(self) -> Array:
-        """The half widths (6,) without those of channels that seem to run ahead."""
-        return np.maximum(self.half, 0.0)
-
-    def moved(self, before: Array, last: Array) -> Play:
-        """Return the play that two steps (6,) of its half widths lead to if all that follow fall by the same share."""
-        share = float(np.clip(last @ before / max(float(before @ before), 1e-300), 0.0, MOST_SHARE))
-        return replace(self, half=self.half + last * share / (1 - share))
+        return bool((np.abs(self.half - other.half) <= np.maximum(SETTLED * self.std, ALIKE * self.half)).all())
 
     def put_right(self, recording: Recording) -> Recording:
         """Return the recording with a wrench that has no play."""
@@ -95,7 +87,7 @@ class Play:
         def right(stream: Stream) -> Stream:
             if stream is not wrench:
                 return stream
-            at = self._behind_at(stream.sampled) * self.width
+            at = self._off_at(stream.sampled)
             torque, force = (stream.channels[name] for name in ("torque", "force"))
             return stream.with_channels(torque=torque - at[:, :3], force=force - at[:, 3:])
 
@@ -105,17 +97,17 @@ class Play:
         """Return a log that was put right as it was read; one without a clock is as it was."""
         if log.time is None:
             return log
-        return replace(log, wrench=np.asarray(log.wrench + self._behind_at(log.time) * self.width @ self.to_sensor.T))
+        return replace(log, wrench=np.asarray(log.wrench + self._off_at(log.time) @ self.to_sensor.T))
 
-    def _behind_at(self, time: Array) -> Array:
-        return np.column_stack([np.interp(time, self.time, channel) for channel in self.behind.T])
+    def _off_at(self, time: Array) -> Array:
+        return np.column_stack([np.interp(time, self.time, channel) for channel in self.off.T])
 
     @property
     def finding(self) -> Finding:
         """What is said of it."""
-        torque, force = np.split(self.width, 2)
+        torque, force = np.split(self.half, 2)
         text = (
-            "The sensor's offset hangs on which way its load last went, as with hysteresis or play: half widths of "
+            "The sensor's offset hangs on which way its load last went, as with hysteresis or play: half loops of "
             f"{shortly(force)} N and {shortly(torque)} N m along its x, y, z. The answer is without it, and its "
             "bars hold all that it did."
         )
@@ -134,20 +126,40 @@ def play(log: MotionLog, whole: MotionLog, recording: Recording, drift: bool) ->
     if not rows.split:
         return None
     M, once = _to_sensor(stream, recording.wrench_sign), rows.solve()
-    load = -features(whole) @ np.einsum("pij,p->ji", design(True), once.solution[:16]) @ np.linalg.inv(M).T
-    reach = np.ptp(load, axis=0)
-    if not (reach > 0).all():
-        return None
-    at = np.searchsorted(whole.time, log.time[pick]).clip(max=len(load) - 1)
-    half = START * reach
-    for last in reversed(range(ROUNDS)):
-        behind = _behind(load, half)
-        columns = M * behind[at][:, None, :]
-        fit = rows.solve(columns, jackknife=not last)
-        found = fit.extra
-        if last:
-            half = np.clip(found, LEAST * reach, MOST * reach)
-    return Play(found, fit.extra_std, whole.time, behind, M, fit.beside(once), _alike(rows).slowly(fit, columns))
+    at = np.searchsorted(whole.time, log.time[pick]).clip(max=len(whole) - 1)
+    moved, solution = features(whole), once.solution
+    for _ in range(ROUNDS):
+        load = -moved @ np.einsum("pij,p->ji", design(True), solution[:16]) @ np.linalg.inv(M).T
+        reach = np.ptp(load, axis=0)
+        if not (reach > 0).all():
+            return None
+        plays = [M * _behind(load, width * reach)[at][:, None, :] for width in WIDTHS]
+        late = np.gradient(load, whole.time, axis=0)[at] @ M.T
+        columns = np.concatenate([*plays, late[:, :, None]], 2)
+        kept = _not_negative(rows, columns)
+        fit = rows.solve(columns[:, :, kept], jackknife=True)
+        solution = fit.solution
+    shares = np.zeros(len(kept))
+    shares[kept] = fit.extra
+    by_width = shares[:-1].reshape(-1, 6)
+    channels = np.append(np.tile(np.eye(6), len(WIDTHS)), np.zeros((6, 1)), 1)[:, kept]
+    std = np.sqrt(np.diag(channels @ fit.extra_covariance @ channels.T))
+    off = np.zeros_like(load)
+    for width, share in zip(WIDTHS, by_width, strict=True):
+        off += _behind(load, width * reach) * share
+    slowly = _alike(rows).slowly(fit, columns[:, :, kept])
+    return Play(by_width.sum(0), std, whole.time, off, M, fit.beside(once), slowly)
+
+
+def _not_negative(rows: Rows, columns: Array) -> Mask:
+    """Return which columns (N, 6, k) stay so that no share of a play is negative; the delay, last, may be."""
+    kept = np.ones(columns.shape[2], np.bool_)
+    while True:
+        negative = rows.solve(columns[:, :, kept]).extra < 0
+        negative[-1] = False
+        if not negative.any():
+            return kept
+        kept[np.flatnonzero(kept)[negative]] = False
 
 
 def lasts(log: MotionLog, drift: bool) -> float:
