@@ -32,7 +32,9 @@ def in_rounds(seed: int, lag: float = 0.0, taken: float = 0.0) -> Recording:
         read[k] = np.clip(read[k - 1], force[k] - half, force[k] + half)
     read = read + rng.normal(0, 0.03, read.shape)
     torque = np.cross(COM, read) + rng.normal(0, 0.002, read.shape)
-    return sy.recording(time=time, force=read, torque=torque, rotation=R, position=moves[:, 3:], gravity=GRAVITY)
+    return sy.recording(
+        time=time, force=read, torque=torque, rotation=R, position=moves[:, 3:] - R @ COM, gravity=GRAVITY
+    )
 
 
 # With play it looked as a controller's in the first three, and as of the other sign in the last two.

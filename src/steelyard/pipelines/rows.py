@@ -163,9 +163,9 @@ class Reading:
             if now is None:
                 break
             if now.like(found):
-                if not now.best(log, drift):
+                if not now.told(log, drift):
                     break
-                if now.sure(lasts(rows.log, drift)):
+                if now.clear(lasts(rows.log, drift)):
                     return right.recording, replace(again, play=now)
                 return self.recording, replace(rows, unplayed=again.log)
             found = now

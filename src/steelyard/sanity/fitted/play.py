@@ -29,8 +29,8 @@ from steelyard.spatial import cross_matrix
 WIDTHS = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
 # The load that they hang on is fitted anew so often.
 ROUNDS = 2
-# It is sure beyond so many standard deviations, by leaving out stretches, where it leaves so much less of what lasts
-# for a second: sound, late and filtered wrenches keep 0.97 of it.
+# It is sure beyond so many standard deviations, by leaving out stretches, and no delay where it leaves so much less of
+# what lasts for a second: sound, late and filtered wrenches keep 0.97 of it.
 SURE, SLOWLY = 4.0, 0.5
 # What a loop is off by is found where it changes by less than so many standard deviations, or by this share.
 SETTLED, ALIKE = 1.0, 0.02
@@ -67,14 +67,19 @@ class Play:
         """The play of each channel alone."""
         return tuple(replace(self, off=self.off * one) for one in np.eye(6))
 
-    def sure(self, slow: float) -> bool:
-        """Whether it surely is play: it leaves far less of what lasts for a second than `slow`, which none leaves."""
-        return self.times > SURE and self.slowly <= SLOWLY * slow
+    def told(self, log: MotionLog, drift: bool) -> bool:
+        """Whether there is any, or a delay instead: it is sure, and leaves less than other causes in the log as read.
 
-    def best(self, log: MotionLog, drift: bool) -> bool:
-        """Whether it leaves less than a turned sensor, unlike gains or another point do in the log as it was read."""
+        These are a turned sensor, unlike gains, and another point.
+        """
+        if self.times <= SURE:
+            return False
         others = sensor_matrix(log, drift), misplaced(log, drift)
         return all(other is None or self.left < other.left for other in others)
+
+    def clear(self, slow: float) -> bool:
+        """Whether it is play, no delay: it leaves far less of what lasts for a second than `slow`, left without it."""
+        return self.slowly <= SLOWLY * slow
 
     def like(self, other: Play) -> bool:
         """Whether another play is the same but for what either may be off by."""
