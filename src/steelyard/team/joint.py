@@ -38,6 +38,7 @@ from steelyard.team.weighed import Seen, clocked, weighed
 
 # What is found of robots that then no longer disagree: poses that are misread may pass for it.
 CHANGES = {"grasp-slipped", "robot-left", "robot-joined"}
+UNLEVEL = "bases disagree on where gravity points: the bars hold how far their mean may be off"
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,16 @@ class JointTeam:
     def _answer(self, log: TeamLog, jumped: ClockErrors, slipped: Sequence[bool]) -> TeamEstimate:
         """Return the answer with stamps put right by `jumped`, and slips taken for the robots' that `slipped` says."""
         seen = (self._from_twists if needs_twists(log) else self._from_poses)(log, jumped, slipped)
-        return seen if isinstance(seen, TeamEstimate) else weighed(seen, self.wrists, self.gains, self.highest_hz)
+        if isinstance(seen, TeamEstimate):
+            return seen
+        answer = self._weighed(seen)
+        if not seen.tipped:
+            return answer
+        others = [self._weighed(replace(seen, rows=rows)).parameters.vector for rows in seen.tipped]
+        return answer.allowing(*(other - answer.parameters.vector for other in others)).noted(UNLEVEL)
+
+    def _weighed(self, seen: Seen) -> TeamEstimate:
+        return weighed(seen, self.wrists, self.gains, self.highest_hz)
 
     def _from_twists(self, log: TeamLog, jumped: ClockErrors, slipped: Sequence[bool]) -> Seen:
         """Return what twists show; raises CannotAnswer where two bodies with a hinge move on bases that move."""
@@ -125,7 +135,8 @@ class JointTeam:
             found.append(tilt.finding)
             log = log if tilt.odd is None else log.without_gravity(log.names[tilt.odd])
         made, path = standing.rows(log, self.highest_hz)
-        return Seen(log, standing, spread, begun, tuple(found), made, path, standing.down(log), yields)
+        tipped = tuple(standing.rows(log, self.highest_hz, tip)[0] for tip in standing.tipped(log, spread))
+        return Seen(log, standing, spread, begun, tuple(found), made, path, standing.down(log), yields, tipped)
 
     def _fitted(
         self, log: TeamLog, of: Callable[[TeamLog, bool], F], jumped: ClockErrors

@@ -154,19 +154,36 @@ class Tilted:
     finding: Finding
 
 
-def tilted(names: tuple[str, ...], down: Array, spread: Spread) -> Tilted | None:
+def unlevel(down: Array, spread: Spread) -> float:
+    """Return how far [rad] the mean of what robots call down may be off, by how far they disagree; zero if they agree.
+
+    down  (N, 3) as of `tilted`
+    """
+    if _disagreeing(down, spread) is None:
+        return 0.0
+    each = unit_vectors(down[down.any(1)])
+    off, n = each - unit_vectors(each.mean(0)), len(each)
+    return float(np.sqrt((off**2).sum() / (n * (n - 1))))
+
+
+def _disagreeing(down: Array, spread: Spread) -> Array | None:
+    """Return the angles (n, n) [rad] between what robots that tell it call down (N, 3); None where they agree."""
+    each = unit_vectors(down[down.any(1)])
+    if len(each) < 2 or spread.blind.size:
+        return None
+    apart = np.arccos(np.clip(each @ each.T, -1.0, 1.0))
+    # Where nothing is lost, the size of the team does not matter.
+    return None if apart.max() < TILTED_BEYOND * spread.turn(1.0) else np.asarray(apart)
+
+
+def tilted(names: tuple[str, ...], down: Array, spread: Spread, mean: str = MEAN) -> Tilted | None:
     """Return who disagrees on where gravity points; None where all agree, or where some turn is not known.
 
     down  (N, 3) what each robot calls down, in common axes; zero of those who do not tell
+    mean  what is said where nobody is alone, so that the mean counts
     """
-    who = np.flatnonzero(down.any(1))
-    if len(who) < 2 or spread.blind.size:
-        return None
-    # Where nothing is lost, the size of the team does not matter.
-    doubt = spread.turn(1.0)
-    each = unit_vectors(down[who])
-    apart = np.arccos(np.clip(each @ each.T, -1.0, 1.0))
-    if apart.max() < max(TILTED, TILTED_BEYOND * doubt):
+    apart, who = _disagreeing(down, spread), np.flatnonzero(down.any(1))
+    if apart is None or apart.max() < TILTED:
         return None
     # The one who is farthest from the others, where those agree far better.
     odd = int(np.argmax(np.median(apart, axis=1)))
@@ -180,6 +197,6 @@ def tilted(names: tuple[str, ...], down: Array, spread: Spread) -> Tilted | None
         said = f"Gravity of '{i}' and of '{j}' points {np.rad2deg(apart.max()):.1f} deg apart"
     text = (
         f"{said}, though motion tells how they are turned: a base, or a level sensor, is tilted, gravity is not what "
-        f"was said, or twists are in other axes. {LEFT_OUT if alone else MEAN}"
+        f"was said, or twists are in other axes. {LEFT_OUT if alone else mean}"
     )
     return Tilted(int(who[odd]) if alone else None, Finding.of("base-tilted", text))

@@ -67,6 +67,7 @@ class Seen:
     rows      of every recording, beside residuals (T, N, 6)     path  (6, 6) their covariance
     down      (3,) gravity in R, None where nobody tells it
     yields    how far grasps yield, by what they push; None where that was not asked
+    tipped    rows as of `rows`, with gravity off by what bases leave open about either level axis; none if they agree
     """
 
     log: TeamLog
@@ -78,6 +79,7 @@ class Seen:
     path: Array
     down: Array | None
     yields: Yields | None = None
+    tipped: tuple[PayloadRows, ...] = ()
 
 
 def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz: float) -> TeamEstimate:

@@ -11,14 +11,14 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
-from steelyard.spatial import Pose
+from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import adjoint_inverse, extent, twists_between
 from steelyard.team.changes.found import Edit, without_changes
 from steelyard.team.changes.slips import Slip
 from steelyard.team.changes.slips_between import slip_between
 from steelyard.team.clocks.errors import ClockErrors
 from steelyard.team.clocks.unsteady import clock_errors
-from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, Tilted, later, tilted
+from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, Tilted, later, tilted, unlevel
 from steelyard.team.payload.body_rows import PayloadRows, balance_frame, from_poses
 from steelyard.team.poses import rows as pose_rows
 from steelyard.team.poses.covariance import Spread
@@ -41,6 +41,7 @@ FOLLOWED = 2
 LOUD = 0.05
 # From this share on nobody can say that the payload turned at all.
 STILL_TURNS = 0.9
+HELD = "The mean was taken, and bars hold how far it may be off."
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +132,16 @@ class PoseTeam(MotionFit):
 
     def tilt(self, log: TeamLog, spread: Spread) -> Tilted | None:
         """Return who disagrees on where gravity points, for homes turned as well as grasps are known to be."""
-        return tilted(log.names, np.einsum("nij,nj->ni", self.fit.team.homes.rotation.matrix, _down(log)), spread)
+        return tilted(log.names, self._called_down(log), spread, HELD)
+
+    def tipped(self, log: TeamLog, spread: Spread) -> tuple[Array, ...]:
+        """Return turns (3,) of gravity in H about two level axes, as far as bases leave open; none if they agree."""
+        off, down = unlevel(self._called_down(log), spread), mean_gravity(log, self.fit.team.homes)
+        return tuple(off * way for way in np.linalg.svd(down[None])[2][1:]) if off else ()
+
+    def _called_down(self, log: TeamLog) -> Array:
+        """Return in H what each robot calls down (N, 3), zero of those who do not tell."""
+        return np.asarray(np.einsum("nij,nj->ni", self.fit.team.homes.rotation.matrix, _down(log)))
 
     def level(self, log: TeamLog) -> Array:
         """Return the direction of gravity over how well it is known (N, 3), as in `Spread`."""
@@ -152,12 +162,15 @@ class PoseTeam(MotionFit):
             Z.position, motion.rotation.matrix, motion.position,
         )  # fmt: skip
 
-    def rows(self, log: TeamLog, highest_hz: float) -> tuple[PayloadRows, Array]:
+    def rows(self, log: TeamLog, highest_hz: float, tip: Array | None = None) -> tuple[PayloadRows, Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their poses, and a row's covariance.
 
         The covariance (6, 6) is that of the path, in the balance frame's axes.
+
+        tip  (3,) [rad] by which gravity is turned in H
         """
         gravity, fit = mean_gravity(log, self.fit.team.homes), self.fit
+        gravity = gravity if tip is None else Rotation.exp(tip).apply(gravity)
         frame = balance_frame(fit.grasps)
         noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", self.J, self.W, self.J))
         noise = adjoint_inverse(frame) @ noise @ adjoint_inverse(frame).T
