@@ -402,6 +402,21 @@ LISTS = """
 """
 
 
+@pytest.mark.parametrize(
+    ("force", "message"),
+    [('["fx", "fy", "fz"]', 'the name "fx" stands over 2 columns'), ("[1, 3, 4]", 'several columns are called "fx"')],
+)
+def test_two_columns_of_one_name_in_parquet_are_refused(tmp_path: Path, force: str, message: str) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    names = ["t", "fx", *COLUMNS[1:]]
+    columns = [arrow.array(column) for column in (ROWS[:, 0], *ROWS.T)]
+    parquet.write_table(arrow.Table.from_arrays(columns, names=names), tmp_path / "a.parquet")
+    text = (STREAM + BY_NAME).replace("a.csv", "a.parquet").replace('["fx", "fy", "fz"]', force)
+    with pytest.raises((BadDescription, BadFile), match=message):
+        read(tmp_path, text)
+
+
 @pytest.mark.parametrize("kind", ["list_", "large_list", "fixed"])
 def test_lists_of_parquet(tmp_path: Path, kind: str) -> None:
     arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")

@@ -57,8 +57,8 @@ _LOOSE = re.compile("[fs]")
 _EARTH = (9.76, 9.84)
 # A unit in brackets behind a name; a number there is an index.
 _IN_BRACKETS = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
-# What stands behind an axis for a unit, the longest first: Fx_N, tau_z_Nm, tau_z_N_m, pos_x_mm, acc_y_m_s2.
 _AXES = frozenset("xyz")
+# What stands behind an axis for a unit, the longest first: Fx_N, tau_z_Nm, tau_z_N_m, pos_x_mm, acc_y_m_s2.
 _BEHIND_AXIS = {
     f"_{unit.replace('*', joint).replace('/', '_').replace('^', '')}": unit
     for unit in sorted({unit for units in UNITS.values() for unit in units} - {"1"}, key=len, reverse=True)

@@ -44,14 +44,15 @@ class ParquetTable:
         """Read the schema only, and the first row of lists; raises BadFile or MissingDependency."""
         arrow, parquet = _pyarrow()
         try:
-            file = parquet.ParquetFile(path)
-            kinds = {field.name: field.type for field in file.schema_arrow}
-            widths = {name: _width(arrow, file, name, kind) for name, kind in kinds.items()}
+            with parquet.ParquetFile(path) as file:
+                fields = list(file.schema_arrow)
+                widths = [(field.name, _width(arrow, file, field)) for field in fields]
         except (arrow.ArrowException, OSError):
             raise BadFile(f"{path}: expected a Parquet file; found something else.") from None
-        names, groups = spread_columns(widths.items())
-        sources = tuple((name, i) for name, width in widths.items() for i in range(1 if width is None else width))
-        dates = tuple(n for n, (name, _) in enumerate(sources) if arrow.types.is_timestamp(kinds[name]))
+        names, groups = spread_columns(widths)
+        sources = tuple((name, i) for name, width in widths for i in range(1 if width is None else width))
+        stamped = {field.name for field in fields if arrow.types.is_timestamp(field.type)}
+        dates = tuple(n for n, (name, _) in enumerate(sources) if name in stamped)
         return cls(path, Header(names, len(names), groups, dates), sources)
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
@@ -77,6 +78,8 @@ class ParquetTable:
         """Raise BadFile where a column holds anything else, before its rows are unpacked: texts have no bound."""
         number = (arrow.types.is_timestamp, arrow.types.is_decimal, arrow.types.is_integer, arrow.types.is_floating)
         for name in names:
+            if schema.names.count(name) > 1:
+                raise BadFile(f'{self.path}: several columns are called "{name}". Rename all but one.')
             kind = schema.field(name).type
             inner = kind.value_type if name in self.header.groups else kind
             if not any(is_one(inner) for is_one in number):
@@ -112,12 +115,13 @@ class ParquetTable:
         return np.asarray(column.to_numpy(), dtype=np.float64)
 
 
-def _width(arrow: Any, file: Any, name: str, kind: Any) -> int | None:
+def _width(arrow: Any, file: Any, field: Any) -> int | None:
     """Return how many items each list of a field has, by the first one; None of a field that holds no such lists."""
+    kind = field.type
     if arrow.types.is_fixed_size_list(kind):
         width = int(kind.list_size)
     elif arrow.types.is_list(kind) or arrow.types.is_large_list(kind):
-        rows = (batch.column(0)[0] for batch in islice(file.iter_batches(1, columns=[name]), _FIRST))
+        rows = (batch.column(0)[0] for batch in islice(file.iter_batches(1, columns=[field.name]), _FIRST))
         width = next((len(row) for row in rows if row.is_valid), 0)
     else:
         return None
