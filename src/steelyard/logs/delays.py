@@ -8,8 +8,9 @@ Source: Atkeson, An, Hollerbach 1986 (the wrench is linear in ten parameters).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class Question:
     unknown: tuple[str, ...]
     known: Mapping[str, float]
     max_delay_s: float
-    _cache: dict[tuple[float, ...], tuple[Motion, Array, Array | None]] = field(default_factory=dict, repr=False)
+    _cache: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -74,19 +75,28 @@ class Question:
 
         What was given in W is turned by the rotation that the delays make of the rows.
         """
-        key = tuple(delays[n] for n in self.unknown)
-        if key not in self._cache:
-            if len(self._cache) > 64:
-                self._cache.clear()
-            self._cache[key] = self.seen_anew(delays)
-        return self._cache[key]
+        motion, wrench = self._once(self._moved, delays, self.kinematics.streams)
+        return motion, wrench, self._once(self._shown, delays, () if self.imu is None else (self.imu.name,))
 
     def seen_anew(self, delays: Delays) -> tuple[Motion, Array, Array | None]:
         """Return what `seen` does, for delays that may be others in each row (N,)."""
-        motion, force = self.kinematics.at(self.time, delays), None
-        if self.imu is not None:
-            force = self.imu.signal.at(self.time + delays.get(self.imu.name, 0.0))
-        return motion, self.felt.in_sensor(motion.rotation), force
+        return *self._moved(delays), self._shown(delays)
+
+    def _once(self, asked: Callable[[Delays], Any], delays: Mapping[str, float], streams: tuple[str, ...]) -> Any:
+        """Return what is asked, which the delays of these streams alone decide: worked out once for each."""
+        key = (asked.__name__, *(delays[n] for n in self.unknown if n in streams))
+        if key not in self._cache:
+            if len(self._cache) > 64:
+                self._cache.clear()
+            self._cache[key] = asked(delays)
+        return self._cache[key]
+
+    def _moved(self, delays: Delays) -> tuple[Motion, Array]:
+        motion = self.kinematics.at(self.time, delays)
+        return motion, self.felt.in_sensor(motion.rotation)
+
+    def _shown(self, delays: Delays) -> Array | None:
+        return None if self.imu is None else self.imu.signal.at(self.time + delays.get(self.imu.name, 0.0))
 
 
 def scan(question: Question) -> dict[str, float]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.inertia.regressor import newton_euler
 from steelyard.logs.autocorrelation import correlation_time
 from steelyard.logs.delays import Clocks, Question, features, free_residual, turning
 from steelyard.logs.imu import Imu, Mounting, first_mount
@@ -121,32 +122,34 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
 
 def _residual(layout: _Layout, theta: Array) -> Array:
     """Return residuals (N, 6) of the wrench, or (N, 9) with those of the accelerometer."""
-    return _rows(layout, theta)[1]
-
-
-def _rows(layout: _Layout, theta: Array) -> tuple[MotionLog, Array]:
-    """Return the rows by the clocks and the mount in theta, and their residuals."""
-    motion, wrench, raw = layout.seen(theta)
-    imu, gravity, zero = layout.question.imu, motion.gravity, np.zeros_like(motion.omega)
-    pull = (gravity if gravity is not None else zero) - motion.acceleration
-    extra: list[Array] = []
-    if imu is not None and raw is not None:
-        mounting = layout.mounting(theta, imu)
-        own = mounting.at_sensor(raw, motion.omega, motion.alpha)
-        if gravity is not None:
-            # What a centre of turning away from S adds; absorbs the S acceleration that nothing measures.
-            shift = lever_acceleration(motion.omega, motion.alpha, layout.get(theta, "centre", np.zeros(3)))
-            # Over the scale, which so multiplies gravity and not the vibration (that would draw it below one).
-            extra = [(own - shift + pull) / mounting.scale]
-        pull = -own
-    log = MotionLog(wrench, pull, zero, motion.omega, motion.alpha)
+    motion, wrench, _ = layout.seen(theta)
+    felt, extra = _felt(layout, theta)
     body, bias = theta[layout.slices["body"]], theta[layout.slices["wrench_bias"]]
-    return log, np.concatenate([wrench - bias - log.predicted(body), *extra], 1)
+    return np.concatenate([wrench - bias - newton_euler(body, felt, motion.omega, motion.alpha), *extra], 1)
+
+
+def _felt(layout: _Layout, theta: Array) -> tuple[Array, list[Array]]:
+    """Return a - g (N, 3) of S by the clocks and the mount in theta, and what the accelerometer shows against it."""
+    motion, _, raw = layout.seen(theta)
+    imu, gravity = layout.question.imu, motion.gravity
+    free = motion.acceleration - (gravity if gravity is not None else 0.0)
+    if imu is None or raw is None:
+        return free, []
+    mounting = layout.mounting(theta, imu)
+    own = mounting.at_sensor(raw, motion.omega, motion.alpha)
+    if gravity is None:
+        return own, []
+    # What a centre of turning away from S adds; absorbs the S acceleration that nothing measures.
+    shift = lever_acceleration(motion.omega, motion.alpha, layout.get(theta, "centre", np.zeros(3)))
+    # Over the scale, which so multiplies gravity and not the vibration (that would draw it below one).
+    return own, [(own - shift - free) / mounting.scale]
 
 
 def _jacobian(layout: _Layout, theta: Array) -> tuple[Array, Array]:
     """Return residuals (N, k) and their derivative (N, k, P), forward differences where it is not linear."""
-    log, base = _rows(layout, theta)
+    motion, wrench, _ = layout.seen(theta)
+    log = MotionLog(wrench, -_felt(layout, theta)[0], np.zeros_like(motion.omega), motion.omega, motion.alpha)
+    base = _residual(layout, theta)
     out = np.zeros((*base.shape, len(theta)))
     out[:, :6, layout.slices["body"]] = -regressors(log)
     out[:, :6, layout.slices["wrench_bias"]] = -np.eye(6)
