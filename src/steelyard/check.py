@@ -33,6 +33,13 @@ def frozen(values: Any) -> Array:
     return array
 
 
+def sealed(values: Array) -> Array:
+    """Return a read-only view, contiguous: a kernel that is handed one kind of array alone is compiled once."""
+    view = np.ascontiguousarray(values, dtype=np.float64).view()
+    view.flags.writeable = False
+    return view
+
+
 def finite(name: str, values: ArrayLike) -> Array:
     """Return `values` frozen, or say how many entries are NaN or infinite and where the first one is."""
     if is_complex(values):
