@@ -128,6 +128,7 @@ class Problem:
         (count, _, width), more = self.T.shape, design.shape
         T = np.zeros((count + more[0], 6, width + more[2]))
         T[:count, :, :width], T[count:, :, width:] = self.T, design
+        T.flags.writeable = False
         return replace(wider, scatter=scatter, T=T, blocks=blocks, block_class=block_class, block_number=groups[:, 2])
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array, Mask, sealed
 from steelyard.logs.clock import sampling_rate
 from steelyard.logs.runs import around
 
@@ -35,13 +35,13 @@ class Curve:
         """
         from scipy.interpolate import PchipInterpolator
 
-        values = np.ascontiguousarray(values, dtype=np.float64)
+        known, values = sealed(known), sealed(values)
         steps = np.diff(known)
         least = _CLOSE * float(np.median(steps))
         # Stamps of a clock that is taken for another's may fall.
         if 0 < steps.min() < least:
             apart = _apart(known, least)
-            known, values = known[apart], values[apart]
+            known, values = sealed(known[apart]), sealed(values[apart])
             steps = np.diff(known)
         gap = steps > BRIDGED * np.median(steps)
         monotone = around(gap) | (len(known) < 4)

@@ -72,7 +72,7 @@ class Parts:
     @property
     def volume(self) -> Array:
         """Volume (P,) [m^3]."""
-        return self.moments[:, 0]
+        return check.frozen(self.moments[:, 0])
 
     @property
     def centroid(self) -> Array:

@@ -39,6 +39,7 @@ class Pose:
     def trusted(cls, rotation: Rotation, position: Array) -> Pose:
         """Wrap what poses make of each other, finite and of one batch shape by construction."""
         pose = object.__new__(cls)
+        position = np.ascontiguousarray(position)
         position.flags.writeable = False
         object.__setattr__(pose, "rotation", rotation)
         object.__setattr__(pose, "position", position)

@@ -53,7 +53,8 @@ class Recentred:
 
 def recentred(data: Effective, body: InertialParameters, error: Array) -> Recentred:
     """Return the body (up to `error` (10, 10) by shape and grasp) with mass and centre where the log sees them, too."""
-    slope, people = parameter_jacobian(body.vector)[:, :4], people_jacobian(body.vector)[:4]
+    phi = body.vector.copy()
+    slope, people = parameter_jacobian(phi)[:, :4], people_jacobian(phi)[:4]
     said, known = _of_log(data, body)
     shared = people @ error
     own = shared @ people.T
@@ -78,7 +79,7 @@ def apart(data: Effective, body: InertialParameters, error: Array) -> float:
 
     error  (10, 10) of the body by its shape
     """
-    people = people_jacobian(body.vector)[1:4]
+    people = people_jacobian(body.vector.copy())[1:4]
     said, known = _of_log(data, body)
     score = said @ (data.pull - data.information @ body.vector)
     # Whatever the mass, which the shape does not know.
@@ -99,9 +100,10 @@ def strayed(data: Effective, body: InertialParameters) -> float:
 
 def _of_log(data: Effective, body: InertialParameters) -> tuple[Array, Array]:
     """Return what the log says of mass and centre, whatever the inertia: rows (4, 10) for F phi, information (4, 4)."""
-    slopes = parameter_jacobian(body.vector)
+    phi = body.vector.copy()
+    slopes = parameter_jacobian(phi)
     seen = slopes.T @ data.information @ slopes
-    inner = seen[4:, 4:] + np.eye(6) / (ANY_INERTIA * half_trace_com(body.vector)) ** 2
+    inner = seen[4:, 4:] + np.eye(6) / (ANY_INERTIA * half_trace_com(phi)) ** 2
     said = np.hstack([np.eye(4), -np.linalg.solve(inner, seen[4:, :4]).T]) @ slopes.T
     known = said @ data.information @ slopes[:, :4]
     return said, 0.5 * (known + known.T)

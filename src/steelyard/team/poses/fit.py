@@ -62,6 +62,9 @@ class Rows:
     team: Team
     apart: Array
 
+    def __post_init__(self) -> None:
+        self.apart.flags.writeable = False
+
     @classmethod
     def settled(cls, data: TeamMotion, team: Team, noise: Array, sweeps: int = 1) -> Rows:
         """Return the rows when the motion has followed grasps and homes; noise (N, 2) [rad, m]."""
@@ -72,7 +75,6 @@ class Rows:
             Z.rotation.matrix, Z.position, X.rotation.matrix, X.position, data.twist, team.delays, W, inverse,
             pattern, sweeps,
         )  # fmt: skip
-        apart.flags.writeable = False
         return cls(data, replace(team, motion=Pose.trusted(Rotation.trusted(turns), places)), apart)
 
     @cached_property
