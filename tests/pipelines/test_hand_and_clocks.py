@@ -86,11 +86,20 @@ def test_where_too_little_is_left_for_clocks_all_rows_tell_them(monkeypatch: pyt
     assert abs(found.mass - BODY.mass) < 3 * found.std[0]
 
 
-@pytest.mark.parametrize("run", ["kuka_run1", "kuka_run2"])
-def test_a_strong_hand_costs_its_time_alone(run: str, examples_dir: Path, data_dir: Path) -> None:
+THRICE = ((1.0, 1.6), (2.7, 3.3), (4.5, 5.2))
+
+
+@pytest.mark.parametrize(
+    ("run", "hands"),
+    [("kuka_run1", (((2.0, 3.0),), ((-1.0, 2.5),))), ("kuka_run2", (((3.0, 99.0),), THRICE))],
+    ids=["kuka_run1", "kuka_run2"],
+)
+def test_a_strong_hand_costs_its_time_alone(
+    run: str, hands: tuple[tuple[tuple[float, float], ...], ...], examples_dir: Path, data_dir: Path
+) -> None:
     swing = read_recording(examples_dir / f"{run}.toml", data=data_dir)
     sound = identify(swing)
-    for spans in [(2.0, 3.0)], [(3.0, 99.0)], [(-1.0, 2.5)], [(1.0, 1.6), (2.7, 3.3), (4.5, 5.2)]:
+    for spans in hands:
         found = identify(pushed(swing, 25.0, *spans))
         assert "contact" in found.codes()
         assert not causes(found)

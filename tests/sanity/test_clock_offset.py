@@ -9,6 +9,7 @@ import pytest
 
 from sanity.held_poses import recorded, swaying
 from sanity.traps import edited
+from steelyard.identify.estimate import Estimate
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
 from steelyard.sanity.readings.clocks import examine_offset
@@ -26,10 +27,14 @@ def apart(recording: Recording, late: float, poses: Recording | None = None, nam
     return replace(recording, streams=streams)
 
 
+@pytest.fixture(scope="module")
+def right() -> Estimate:
+    return identify(apart(recorded("paper", 0), 0.0))
+
+
 @pytest.mark.parametrize("late", [-987654.321, -3.2, 0.9, 5.0, 1.7e9])
-def test_clocks_are_brought_together(late: float) -> None:
-    recording = recorded("paper", 0)
-    found, right = identify(apart(recording, late)), identify(apart(recording, 0.0))
+def test_clocks_are_brought_together(late: float, right: Estimate) -> None:
+    found = identify(apart(recorded("paper", 0), late))
     assert found.findings[0].code == "stream-delayed"
     assert f"{'late' if late > 0 else 'early'} by {abs(late):.1f} s" in found.findings[0].message
     assert found.codes() == right.codes() | {"stream-delayed"}
@@ -37,12 +42,11 @@ def test_clocks_are_brought_together(late: float) -> None:
     np.testing.assert_allclose(found.parameters.vector[:4], right.parameters.vector[:4], rtol=2e-3, atol=1e-4)
 
 
-def test_a_mount_that_is_given_turns_the_wrench() -> None:
+def test_a_mount_that_is_given_turns_the_wrench(right: Estimate) -> None:
     recording, turn = recorded("paper", 0), Rotation.exp([0.0, 0.0, 0.6])
     own = turn.inverse().apply
     felt, posed = apart(edited(recording, force=own, torque=own), 1.7e9).streams
     found = identify(replace(recording, streams=(replace(felt, mount=Mount(turn)), posed)))
-    right = identify(apart(recording, 0.0))
     assert found.delays_s["poses.csv"] == pytest.approx(1.7e9, abs=0.01)
     np.testing.assert_allclose(found.parameters.vector[:4], right.parameters.vector[:4], rtol=2e-3, atol=1e-4)
 

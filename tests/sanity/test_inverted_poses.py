@@ -25,10 +25,19 @@ def inverted(recording: Recording, positions: bool) -> Recording:
     return replace(recording, streams=tuple(streams))
 
 
+@pytest.fixture(scope="module")
+def made() -> Recording:
+    return hammer.recording(0).recording
+
+
+@pytest.fixture(scope="module")
+def right(made: Recording) -> sy.Estimate:
+    return sy.identify(made)
+
+
 @pytest.mark.parametrize("positions", [True, False])
-def test_inverse_poses_answer_as_right_ones(positions: bool) -> None:
-    made = hammer.recording(0).recording
-    right, found = sy.identify(made), sy.identify(inverted(made, positions))
+def test_inverse_poses_answer_as_right_ones(positions: bool, made: Recording, right: sy.Estimate) -> None:
+    found = sy.identify(inverted(made, positions))
     np.testing.assert_allclose(found.parameters.vector, right.parameters.vector, rtol=1e-6, atol=1e-9)
     (said,) = [f for f in found.findings if f.code == "gravity-frame"]
     assert ("rotations and positions" in said.message) == positions

@@ -10,6 +10,7 @@ import pytest
 from sanity.held_poses import BODY, of_the_tip, recorded
 from sanity.traps import edited
 from steelyard.errors import CannotAnswer
+from steelyard.identify.estimate import Estimate
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines.held_object import identify
 from steelyard.sanity.before import examine
@@ -34,8 +35,13 @@ def poses(arm: float) -> Recording:
     return Recording((Stream("poses", channels),), np.array([0, 0, -9.81]), 1)
 
 
-def test_pounds_with_inches_are_put_right() -> None:
-    found, right = identify(read_as(PLAIN, *INCHES)), identify(PLAIN)
+@pytest.fixture(scope="module")
+def right() -> Estimate:
+    return identify(PLAIN)
+
+
+def test_pounds_with_inches_are_put_right(right: Estimate) -> None:
+    found = identify(read_as(PLAIN, *INCHES))
     assert found.codes() == right.codes() | {"force-unit"}
     assert "forces in lbf and torques in lbf*in are read as N and N*m" in found.findings[0].message
     assert found.mass == pytest.approx(BODY.mass, rel=0.002)
@@ -52,9 +58,9 @@ def test_pounds_with_feet_are_named() -> None:
 
 
 @pytest.mark.parametrize("kgf", [False, True])
-def test_centimetres_are_put_right_and_what_looks_alike_is_named(kgf: bool) -> None:
+def test_centimetres_are_put_right_and_what_looks_alike_is_named(kgf: bool, right: Estimate) -> None:
     scale = 1 / 9.80665 if kgf else 1.0
-    found, right = identify(read_as(PLAIN, scale, 100 * scale)), identify(PLAIN)
+    found = identify(read_as(PLAIN, scale, 100 * scale))
     (unit,) = (f for f in found.findings if f.code == "force-unit")
     assert "torques in N*cm are read as N*m" in unit.message
     assert "In kgf and kgf*cm they would look the same, and mass and inertia be 9.81 times larger" in unit.message

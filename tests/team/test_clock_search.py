@@ -97,6 +97,13 @@ def test_good_logs_are_never_searched(case: str, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr("steelyard.team.joint.searched", refused)
     JointTeam().identify(simulate_team(TeamScene(CASES[case], motion_samples=1500), 7).log)
+
+
+def test_clocks_that_were_said_to_agree_are_never_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("steelyard.team.joint.searched", refused)
     JointTeam(clocks=False).identify(late(trial().log, robot1=0.7))
 
 

@@ -90,8 +90,7 @@ def put_right(log: TeamLog, kinds: dict[str, tuple[Array, str, str]], turn: bool
         alike(found, right)
 
 
-@pytest.mark.parametrize("seed", [11, 12, 13])
-@pytest.mark.parametrize("case", ["A", "B", "C", "D"])
+@pytest.mark.parametrize(("case", "seed"), [("A", 11), ("B", 12), ("C", 13), ("D", 11)])
 def test_each_misreading_is_put_right_and_named(case: str, seed: int) -> None:
     put_right(simulate_team(scene(case), seed).log, {k: v for k, v in MISREAD.items() if case != "D" or k != "lbf"})
 
