@@ -10,6 +10,7 @@ import pytest
 from made_recordings import BODY, Swing, recording
 
 from steelyard.check import Array
+from steelyard.identify.estimate import Estimate
 from steelyard.logs.alignment import align
 from steelyard.logs.arrival import when_sampled
 from steelyard.logs.recording import Recording
@@ -131,6 +132,11 @@ def made(seed: int) -> Recording:
     return recording(Swing(seed, 16.0), seed=seed + 1, position=True, imu=False)
 
 
+@pytest.fixture(scope="module")
+def sound() -> Estimate:
+    return identify(made(0))
+
+
 @pytest.mark.parametrize("name", ["wrench.csv", "pose.csv"])
 @pytest.mark.parametrize(
     ("waiting", "rate_is_lost"),
@@ -142,8 +148,10 @@ def made(seed: int) -> Recording:
     ],
     ids=["once", "often", "packets", "radio"],
 )
-def test_waiting_costs_nothing(name: str, waiting: Callable[[Array], Array], rate_is_lost: bool) -> None:
-    found, sound = identify(late(made(0), name, waiting)), identify(made(0))
+def test_waiting_costs_nothing(
+    name: str, waiting: Callable[[Array], Array], rate_is_lost: bool, sound: Estimate
+) -> None:
+    found = identify(late(made(0), name, waiting))
     # Where all rows wait for others of their packet, the stream is late.
     assert found.codes() <= {"stream-delayed"}
     assert (np.abs(found.parameters.people - BODY.people) < 4 * found.std).all()
