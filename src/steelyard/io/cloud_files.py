@@ -100,7 +100,7 @@ def _rgb(columns: dict[str, Any]) -> Any:
 
 
 def _bits(packed: Any) -> Any:
-    """Return packed colours (N,) as whole numbers: those that they are, also as floats, or those whose bits floats have.
+    """Return packed colours (N,) as whole numbers: as they are, also in floats, or those whose bits floats have.
 
     A float with the bits of a colour is below 1e-37, negative, or larger than any packed colour.
     """
