@@ -228,3 +228,58 @@ def test_other_members_of_an_npz_are_passed_over(tmp_path: Path, name: str) -> N
     cloud = read_cloud(path)
     np.testing.assert_array_equal(cloud.xyz, points)
     assert cloud.label is None
+
+
+def test_lists_behind_the_points_may_have_any_lengths(tmp_path: Path) -> None:
+    """As the range grid of an organised cloud of the Point Cloud Library, which is no mesh."""
+    write_cloud(CLOUD, tmp_path / "a.ply")
+    head, _, body = (tmp_path / "a.ply").read_bytes().partition(b"end_header\n")
+    grid = b"element range_grid 3\nproperty list uchar int vertex_indices\nend_header\n"
+    cells = b"\0" + b"".join(b"\1" + struct.pack("<i", k) for k in range(2))
+    (tmp_path / "a.ply").write_bytes(head + grid + body + cells)
+    assert np.array_equal(read_cloud(tmp_path / "a.ply").xyz, CLOUD.xyz)
+
+
+def test_a_mesh_of_mixed_faces_is_called_a_mesh(tmp_path: Path) -> None:
+    write_cloud(CLOUD, tmp_path / "a.ply")
+    head, _, body = (tmp_path / "a.ply").read_bytes().partition(b"end_header\n")
+    faces = b"element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = b"\3" + struct.pack("<3i", 0, 1, 2) + b"\4" + struct.pack("<4i", 0, 1, 2, 3)
+    (tmp_path / "a.ply").write_bytes(head + faces + body + rows)
+    with pytest.raises(BadFile, match="this is a mesh of 2 faces"):
+        read_cloud(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize(
+    ("points", "colours", "normals"),
+    [("points", "colors", "normals"), ("positions", "colors", "normals"), ("xyz", "color", "normal")],
+)
+def test_other_names_of_arrays(tmp_path: Path, points: str, colours: str, normals: str) -> None:
+    np.savez(tmp_path / "a.npz", **{normals: NORMALS, colours: CLOUD.rgb, points: CLOUD.xyz})  # type: ignore[arg-type]
+    read = read_cloud(tmp_path / "a.npz")
+    for name in ("xyz", "rgb", "normals"):
+        assert np.array_equal(getattr(read, name), getattr(CLOUD, name))
+
+
+@pytest.mark.parametrize("alpha", [0, 255])
+@pytest.mark.parametrize("as_number", [False, True])
+def test_colours_packed_in_floats(tmp_path: Path, alpha: int, as_number: bool) -> None:
+    """As bits, which may be those of NaN, or as the number itself."""
+    whole = (CLOUD.rgb.astype(np.uint32) @ np.array([65536, 256, 1], np.uint32)) | np.uint32(alpha << 24)  # type: ignore[union-attr]
+    table = np.zeros(50, [(axis, "<f4") for axis in "xyz"] + [("rgb", "<f8" if as_number else "<f4")])
+    table["rgb"] = whole if as_number else whole.view("<f4")
+    size = table.dtype["rgb"].itemsize
+    head = f"FIELDS x y z rgb\nSIZE 4 4 4 {size}\nTYPE F F F F\nPOINTS 50\nDATA binary\n"
+    (tmp_path / "a.pcd").write_bytes(f"VERSION .7\n{head}".encode() + table.tobytes())
+    assert np.array_equal(read_cloud(tmp_path / "a.pcd").rgb, CLOUD.rgb)
+
+
+@pytest.mark.parametrize(("without", "left"), [(4, 46), (5, 50), (50, 50)])
+@pytest.mark.parametrize("none", [np.nan, 0.0])
+def test_few_points_without_a_normal_are_left_out(tmp_path: Path, without: int, left: int, none: float) -> None:
+    normals = NORMALS.copy()
+    normals[:without] = none
+    holes = np.full((20, 3), np.nan)
+    np.savez(tmp_path / "a.npz", xyz=np.vstack([CLOUD.xyz, holes]), normals=np.vstack([normals, holes]))
+    read = read_cloud(tmp_path / "a.npz")
+    assert (len(read), read.left_out, read.normals is None) == (left, 70 - left, left == 50)

@@ -414,3 +414,25 @@ def test_a_cup_of_uneven_points_somewhat_more_than_are_used_stays_open(seed: int
     solid = enclose(Cloud(xyz[rng.choice(len(xyz), 6000, False, weight / weight.sum())]))
     assert solid.mesh.volume == pytest.approx(made.volume, rel=0.15)
     assert "outliers" not in codes(solid)
+
+
+@pytest.mark.parametrize(
+    ("turn", "half", "step"),
+    [
+        ([0.7, -0.4, 1.1], [25, 22, 10], 3),  # had come out at 0.38
+        ([0.7, -0.4, 1.1], [30, 15, 12], 2),  # at 0.25
+        ([0.0, 0.0, 0.0], [25, 22, 10], 3),  # rounding leaves 0.82
+        ([0.0, 0.0, 0.0], [20, 20, 20], 3),  # and 1.16
+    ],
+)
+def test_stairs_of_voxels_are_no_thin_walls(turn: list[float], half: list[float], step: float) -> None:
+    rng = np.random.default_rng(0)
+    side = 1e-3 * np.array(half)
+    share = side[[1, 0, 0]] * side[[2, 2, 1]]
+    box = rng.uniform(-1, 1, (20_000, 3))
+    axis = rng.choice(3, len(box), p=share / share.sum())
+    box[np.arange(len(box)), axis] = np.sign(box[np.arange(len(box)), axis])
+    askew = 1e3 * Rotation.exp(turn).apply(side * box)
+    made = enclose(Cloud(1e-3 * step * np.unique(np.round(askew / step), axis=0)))
+    assert abs(made.mesh.volume / (8 * side.prod()) - 1) < min(3.5 * made.volume_std, 0.2)
+    assert "thin-thickened" not in {finding.code for finding in made.findings}

@@ -15,7 +15,7 @@ import numpy as np
 from steelyard.errors import BadFile, BadValue
 from steelyard.findings import REMEDIES, Finding
 from steelyard.io.contents import in_file
-from steelyard.io.ply_files import ply, read_ply
+from steelyard.io.ply_files import Ply, ply
 from steelyard.io.shapes.pcd_files import read_pcd
 from steelyard.io.tables.array_table import ArrayTable, npz, read_numbers
 from steelyard.shape.cloud import Cloud
@@ -23,9 +23,18 @@ from steelyard.shape.known_space import Kept, KeptSpace
 from steelyard.whole_files import write_bytes
 
 SUFFIXES = (".ply", ".pcd", ".npz")
+_FEW = 0.1  # of the points: fewer without a normal are left out, of more no normal is used
 _LABELS = ("label", "segmentation", "part")
 _COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
+# Of an NPZ, ours first: other programs call points, colours and normals by other names.
+_ARRAYS = (
+    ("xyz", "points", "positions"),
+    ("rgb", "colors", "colours", "color", "colour"),
+    ("label",),
+    ("normals", "normal"),
+    ("seen",),
+)
 
 # Of a PLY elements, of an NPZ arrays.
 SCAN, CELLS = "scan", "cell_emptied"
@@ -36,16 +45,18 @@ _NUMBERS = ("unseen", "unsure_m3", "skin")
 def read_cloud(path: Path | str) -> Cloud:
     """Read a cloud in metres by the ending of its name; raises BadFile.
 
-    Points with NaN or infinity, as in the holes of an organised PCD, are left out and counted.
+    Points with NaN or infinity, as in the holes of an organised PCD, are left out and counted, and so are few that have
+    no normal among many that have one.
     """
     path, kept = Path(path), None
     if not path.is_file():
         raise BadFile(f"{path}: no such file.")
     match path.suffix.lower():
         case ".ply":
-            elements = read_ply(path)
+            file = Ply.open(path)
+            _require_points_only(path, file.count("face"))
+            elements = file.read("vertex", SCAN, CELLS)
             columns = elements.get("vertex", {})
-            _require_points_only(path, len(next(iter(elements.get("face", {}).values()), ())))
             kept = kept_of(path, *(next(iter(elements.get(name, {}).values()), None) for name in (SCAN, CELLS)))
         case ".pcd":
             columns = read_pcd(path)
@@ -83,20 +94,30 @@ def _rgb(columns: dict[str, Any]) -> Any:
             return _stacked(columns, names)
     for name in ("rgb", "rgba"):
         if name in columns:
-            packed = np.ascontiguousarray(columns[name])
-            bits = packed.astype(np.float32).view(np.uint32) if packed.dtype.kind == "f" else packed.astype(np.uint32)
+            bits = _bits(np.ascontiguousarray(columns[name]))
             return np.stack([bits >> shift & 255 for shift in (16, 8, 0)], axis=1).astype(np.uint8)
     return None
 
 
+def _bits(packed: Any) -> Any:
+    """Return packed colours (N,) as whole numbers: as they are, also in floats, or those whose bits floats have.
+
+    A float with the bits of a colour is below 1e-37, negative, or larger than any packed colour.
+    """
+    if packed.dtype.kind == "f":
+        with np.errstate(invalid="ignore"):  # bits of a colour may be those of NaN
+            whole = (packed == np.floor(packed)) & (packed >= 0) & (packed < 2**32)
+        if not whole.all():
+            return packed.astype(np.float32).view(np.uint32)
+    return packed.astype(np.uint32)
+
+
 def _of_arrays(path: Path) -> Cloud:
     header = ArrayTable.open(path).header  # refuses pickles by their header
-    if "xyz" not in header.groups:
+    wanted = [next((name for name in names if name in header.groups), names[0]) for names in _ARRAYS]
+    if wanted[0] not in header.groups:
         parts = "; it holds parts, which --parts takes" if "tets" in header.groups else ""
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
-    # Other programs call colours by other names.
-    coloured = next((name for name in ("rgb", "colors", "colours") if name in header.groups), "rgb")
-    wanted = ("xyz", coloured, "label", "normals", "seen")
     found = read_numbers(path, [name for name in (*wanted, SCAN, CELLS) if name in header.shapes])
     kept = kept_of(path, found.get(SCAN), found.get(CELLS))
     return _checked(path, tuple(found.get(name) for name in wanted), kept)
@@ -115,9 +136,21 @@ def _checked(path: Path, points: tuple[Any, ...], kept: Kept | None) -> Cloud:
         what = f"all {len(xyz)} points are NaN or infinite" if len(xyz) else "the file holds no points"
         raise BadFile(f"{path}: {what}. Write the cloud again, or scan the object again.")
     whole = [None if c is None else np.asarray(c) for c in points[1:]]
+    holes |= _without_normal(whole[2], holes)
     if holes.any():
         xyz, whole = xyz[~holes], [c if c is None or len(c) != len(holes) else c[~holes] for c in whole]
     return in_file(path, lambda: Cloud(xyz, *whole, left_out=int(holes.sum()), kept=kept))
+
+
+def _without_normal(normals: Any, holes: Any) -> Any:
+    """Return which points (N,) have no normal where nearly all that have a place have one.
+
+    The Point Cloud Library gives NaN to points with too few neighbours; all zero is a column that nobody filled.
+    """
+    if normals is None or normals.shape != (len(holes), 3):
+        return np.zeros(len(holes), bool)
+    none = ~(np.isfinite(normals).all(1) & normals.any(1))
+    return none & (none[~holes].mean() < _FEW)
 
 
 def write_cloud(cloud: Cloud, path: Path | str) -> None:

@@ -35,22 +35,48 @@ class _Element:
     fields: list[tuple[str, str, str]]  # name, type of the values, type of a list's length or ""
 
 
+@dataclass(frozen=True)
+class Ply:
+    """A PLY file whose header was read: its byte order ("" for ascii), its elements and what stands behind them."""
+
+    path: Path
+    order: str
+    elements: list[_Element]
+    body: bytes
+
+    @classmethod
+    def open(cls, path: Path) -> Ply:
+        """Read the header; raises BadFile."""
+        content = read_whole(path)
+        order, elements, body = _header(path, content)
+        return cls(path, order, elements, content[body:])
+
+    def count(self, name: str) -> int:
+        """Return how many rows of an element are announced."""
+        return sum(element.count for element in self.elements if element.name == name)
+
+    def read(self, *wanted: str) -> dict[str, dict[str, Column]]:
+        """Return element -> column -> values as `read_ply`, up to the last that is wanted, all where none is named.
+
+        What stands behind is passed over: its lists may have any lengths. Raises BadFile.
+        """
+        places = [k for k, element in enumerate(self.elements, 1) if element.name in wanted or not wanted]
+        out, rest = {}, self.body
+        words = rest.split() if not self.order else []
+        for element in self.elements[: max(places, default=0)]:
+            if self.order:
+                table, used = _binary(self.path, element, rest, self.order)
+                rest = rest[used:]
+            else:
+                table, used = _ascii(self.path, element, words)
+                words = words[used:]
+            out[element.name] = {name: table[name] for name, _, _ in element.fields}
+        return out
+
+
 def read_ply(path: Path | str) -> dict[str, dict[str, Column]]:
     """Return element -> column -> values (N,) or, for a list of equal lengths, (N, k); raises BadFile."""
-    path = Path(path)
-    content = read_whole(path)
-    order, elements, body = _header(path, content)
-    out, rest = {}, content[body:]
-    words = rest.split() if not order else []
-    for element in elements:
-        if order:
-            table, used = _binary(path, element, rest, order)
-            rest = rest[used:]
-        else:
-            table, used = _ascii(path, element, words)
-            words = words[used:]
-        out[element.name] = {name: table[name] for name, _, _ in element.fields}
-    return out
+    return Ply.open(Path(path)).read()
 
 
 def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:

@@ -148,9 +148,8 @@ def _solid(cloud: Cloud, scan: Scan | Kept | None) -> tuple[Solid, tuple[str, ..
 
 
 def _notes(given: Cloud) -> tuple[str, ...]:
-    """Return how many points of a cloud had no place, if any."""
+    """Return how many points of a cloud had no place or no normal, if any."""
     if not given.left_out:
         return ()
-    are = "is" if given.left_out == 1 else "are"
     of = len(given) + given.left_out
-    return (f"{given.left_out} of {of} points of the cloud {are} NaN or infinite: left out",)
+    return (f"{given.left_out} of {of} points of the cloud left out: no finite place or normal",)

@@ -32,6 +32,9 @@ _SMOOTH = np.radians(60.0)  # neighbours whose normals are farther apart lie on 
 # of cells unsure; per share that a skin as thick as the noise has; where walls blur, else per share in thin ones;
 # per share left open.
 _STD, _CHORDS, _UNSURE, _SKIN, _THIN, _HOLE = 0.025, 0.7, 0.1, 0.1, 0.5, 1.0
+_ROUNDED = (
+    0.118  # per share that a skin as thick as a voxel has: six faces are rounded, each by itself, 1 / sqrt(12 * 6)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +85,8 @@ def judged(used: WorkingCloud, surface: Oriented, found: Filled, turned: tuple[F
     unsure = float((mesh.volumes * (1 - sure)).sum() / mesh.volume)
     wrong = 1.0 if any(finding.code == "table-in-cloud" for finding in findings) else wrong
     few = _CHORDS * _lacking(surface, mesh.volume / diagonal**3)
-    skin = used.noise * total * diagonal**2 / mesh.volume
-    std = float(np.linalg.norm([max(_STD, few), _UNSURE * unsure, _SKIN * skin, _THIN * wrong, _HOLE * gap * hole]))
+    skin = float(np.hypot(_SKIN * used.noise, _ROUNDED * used.voxel)) * total * diagonal**2 / mesh.volume
+    std = float(np.linalg.norm([max(_STD, few), _UNSURE * unsure, skin, _THIN * wrong, _HOLE * gap * hole]))
     surface_m = std * mesh.volume / (total * diagonal**2)
     inside = np.flatnonzero(found.inside)
     return Solid(mesh, used.cloud.with_normals(surface.normals), sure, std, surface_m, findings, found.mesh, inside)

@@ -15,7 +15,7 @@ from steelyard.shape.pairs import joined
 from steelyard.shape.points.known_sides import settled_along
 from steelyard.shape.points.left_table import left_table
 from steelyard.shape.points.noisy_points import settled
-from steelyard.shape.points.spacing import Neighbours, evenly
+from steelyard.shape.points.spacing import Neighbours, evenly, voxel_side
 from steelyard.shape.points.thinning import spread_to
 
 LEAST = 20  # points that can show a solid
@@ -35,12 +35,14 @@ class WorkingCloud(NamedTuple):
     """The points to make a solid from, the noise that was averaged out of them [m], and what was done to them.
 
     along  whether they were moved along normals that came with them
+    voxel  side of the voxels whose centres they were [m], 0 where they were none
     """
 
     cloud: Cloud
     noise: float
     findings: tuple[Finding, ...]
     along: bool = False
+    voxel: float = 0.0
 
 
 def working_cloud(cloud: Cloud, most: int, settle: bool | None = None) -> WorkingCloud:
@@ -92,7 +94,10 @@ def _without_repeats(cloud: Cloud) -> Cloud:
 def _thinned(cloud: Cloud, most: int, settle: bool | None) -> WorkingCloud:
     """Return at most about `most` well-spread points, of a fair draw where there are many more."""
     if len(cloud) <= 1.04 * most:
-        whole = WorkingCloud(cloud, 0.0, ())
+        voxel = voxel_side(cloud.xyz, cloud.near.index) if len(cloud) >= LEAST else 0.0
+        whole = WorkingCloud(cloud, 0.0, (), voxel=voxel)
+        if voxel and cloud.normals is None:
+            settle = True  # stairs look like walls that face each other
         if settle is False or (cloud.normals is None and not settle):
             return whole
         return _settled(whole, cloud.near.spacing, len(cloud), sheets=bool(settle))
@@ -130,7 +135,8 @@ def _settled(used: WorkingCloud, apart: float, most: int, sheets: bool = True) -
     rows = rows if along is None else along.rows
     text = f"The points have noise of about {found.noise * 1e3:.2g} mm; each was moved to where its neighbours lie."
     findings = (Finding.of("cloud-noisy", text),)
-    return WorkingCloud(replace(cloud.chosen(rows), xyz=found.xyz), found.noise, findings, along is not None)
+    moved = replace(cloud.chosen(rows), xyz=found.xyz)
+    return WorkingCloud(moved, found.noise, findings, along is not None, used.voxel)
 
 
 def _spread(cloud: Cloud, most: int) -> tuple[Integers, float, Array]:

@@ -11,6 +11,9 @@ from steelyard.check import Array, Integers
 COUNT = 24  # neighbours looked at
 _CLOSE = 12  # neighbours that give the spacing
 _FOLLOWED = 10  # neighbours on the same sheet that give the area
+_LOOKED_AT = 300  # points that tell whether all lie on a grid
+# Their neighbours looked at, the largest square of a distance over the least, how whole these are, how many must be.
+_STEPS, _FARTHEST, _EXACT, _GRID = 6, 6.5, 0.01, 0.9
 _ABOUT = -0.3  # cosine between normals below which a neighbour lies on the other side of a wall or gap
 
 
@@ -65,3 +68,16 @@ def areas(near: Neighbours, normals: Array) -> Array:
     used = np.clip(found[:, -1], 1, _FOLLOWED)
     last = (found >= used[:, None]).argmax(1)
     return np.asarray(np.pi * near.distance[np.arange(len(last)), last] ** 2 / used)
+
+
+def voxel_side(xyz: Array, index: Integers) -> float:
+    """Return the side of the voxels whose centres points (N, 3) with neighbours (N, K), nearest first, are; 0 for none.
+
+    Squares of distances between them are small multiples of the least.
+    """
+    rows = evenly(len(xyz), _LOOKED_AT)
+    away = np.linalg.norm(xyz[index[rows, :_STEPS]] - xyz[rows, None], axis=-1)
+    side = float(away.min())
+    squared = (away / side) ** 2
+    whole = (np.abs(squared - np.round(squared)) < _EXACT) & (squared < _FARTHEST)
+    return side if whole.mean() > _GRID else 0.0

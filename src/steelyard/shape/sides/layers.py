@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array, Integers, Mask
 from steelyard.shape.points.plane_axis import least_axis
-from steelyard.shape.points.spacing import evenly
+from steelyard.shape.points.spacing import evenly, voxel_side
 
 _NEIGHBOURS = 20  # that show two layers
 _ROUNDS = 6  # of telling the layers apart and fitting them
@@ -54,11 +54,13 @@ class Layers(NamedTuple):
     def of(cls, xyz: Array, index: Integers, spacing: float = 0.0) -> Layers | None:
         """Return the layers of points (N, 3) with neighbours (N, K), nearest first; None where they have one.
 
+        The stairs of voxels are no layers.
+
         spacing  of the points; where it is given, a thin wall of an else thick object counts, too
         """
         near = np.ascontiguousarray(index[:, :_NEIGHBOURS])
         some = evenly(len(xyz), _LOOKED_AT)
-        if near.shape[1] < _NEIGHBOURS:
+        if near.shape[1] < _NEIGHBOURS or voxel_side(xyz, near):
             return None
         first = _layers(xyz, near, some)[0]
         if _two(first, _SOME, _SOME_BLURRED) is None and (first < _TWO).mean() < _SOME_ON_ONE:
