@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 REMEDIES: dict[str, str] = {
-    "wrench-sign-flipped": 'Set wrench = "on-sensor" in [log] or the [[robot]] ("on-object" if that is "on-sensor").',
+    "wrench-sign-flipped": 'Set wrench = "on-sensor" in [log] ("on-object" if that is what it says).',
     "gravity-frame": "Check [log] gravity (in the world frame) and that rotation turns S into W, not W into S.",
     "gravity-in-g": 'Set unit = "g" for this channel, or correct [log] gravity to m/s^2.',
     "weight-compensated": "Set the payload in the controller, or in the sensor's driver, to zero, and record again; or "

@@ -41,8 +41,8 @@ SPOILED: dict[str, tuple[Spoil, str]] = {
     "cm as mm": (scaled(0.1), "10 times too small, as when cm are read as mm"),
     "inches as mm": (scaled(1 / 25.4), "25.4 times too small, as when inches are read as mm"),
     "transposed": (lambda R, p: (turned_back(R), p), "rotation turns W into S, not S into W"),
-    "w last": (lambda R, p: (rolled(R, 1), p), "in the order x, y, z, w, not w, x, y, z"),
-    "w first": (lambda R, p: (rolled(R, -1), p), "in the order w, x, y, z, not x, y, z, w"),
+    "w last": (lambda R, p: (rolled(R, -1), p), "in the order x, y, z, w, not w, x, y, z"),
+    "w first": (lambda R, p: (rolled(R, 1), p), "in the order w, x, y, z, not x, y, z, w"),
     "inverted": (
         lambda R, p: (turned_back(R), -np.einsum("tji,tj->ti", R, p)),
         "poses are those of its home in its grasp",

@@ -112,13 +112,13 @@ MISREAD = (
         "quaternion-order",
         "the four numbers of each quaternion are in the order x, y, z, w, not w, x, y, z as was said or assumed",
         None,
-        lambda R: rolled(R, -1),
+        lambda R: rolled(R, 1),
     ),
     Misread(
         "quaternion-order",
         "the four numbers of each quaternion are in the order w, x, y, z, not x, y, z, w as was said or assumed",
         None,
-        lambda R: rolled(R, 1),
+        lambda R: rolled(R, -1),
     ),
     Misread(
         "gravity-frame",

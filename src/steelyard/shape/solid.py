@@ -32,9 +32,8 @@ _SMOOTH = np.radians(60.0)  # neighbours whose normals are farther apart lie on 
 # of cells unsure; per share that a skin as thick as the noise has; where walls blur, else per share in thin ones;
 # per share left open.
 _STD, _CHORDS, _UNSURE, _SKIN, _THIN, _HOLE = 0.025, 0.7, 0.1, 0.1, 0.5, 1.0
-_ROUNDED = (
-    0.118  # per share that a skin as thick as a voxel has: six faces are rounded, each by itself, 1 / sqrt(12 * 6)
-)
+# Per share that a skin as thick as a voxel has: six faces are rounded, each by itself.
+_ROUNDED = (12 * 6) ** -0.5
 
 
 @dataclass(frozen=True, eq=False)

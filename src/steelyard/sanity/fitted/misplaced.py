@@ -138,7 +138,11 @@ class Misplaced:
         """Say what is of it, what it may be, and what to do."""
         if self.measured:
             return "the accelerations were those of", "", "Correct the accelerometer's mount by as much."
-        remedy = "Set the controller's TCP to S, or correct the positions."
+        mount = ", ".join(f"{v:.1f}" for v in np.round(-1e3 * self.place, 1) + 0.0)
+        remedy = (
+            "Set the controller's TCP to S, or correct the positions; or call their point S, and give the wrench "
+            f'mount = {{ position = [{mount}], unit = "mm" }} in it.'
+        )
         return "the positions were those of", ", such as the tip of a tool", remedy
 
     def allowed(self, estimate: Estimate) -> Estimate:

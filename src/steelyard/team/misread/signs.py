@@ -23,7 +23,8 @@ TORQUES_TURNED = np.diag([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
 def sign_finding(name: str) -> Finding:
     """Return the finding of a robot whose forces had the other sign."""
     text = f"What '{name}' and the others push against one another cancels only with its sign turned; it was."
-    return Finding.of("wrench-sign-flipped", text)
+    remedy = f'Set wrench = "on-sensor" in the [[robot]] \'{name}\' ("on-object" if that is what it says).'
+    return Finding("wrench-sign-flipped", text, remedy)
 
 
 def torque_sign_finding(name: str, turned: bool) -> Finding:
