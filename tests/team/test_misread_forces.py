@@ -172,8 +172,11 @@ def test_gains_and_biases_are_no_unit(changes: dict[str, Any], monkeypatch: pyte
 def test_a_sensor_turned_by_another_angle_is_named(robots: int) -> None:
     tilt = np.deg2rad(30.0)
     turn = np.array([[1, 0, 0], [0, np.cos(tilt), -np.sin(tilt)], [0, np.sin(tilt), np.cos(tilt)]])
-    found = JointTeam().identify(said(simulate_team(scene(robots=robots), 26).log, "robot1", turn))
+    log = simulate_team(scene(robots=robots), 26).log
+    found = JointTeam().identify(said(log, "robot1", turn))
     (finding,) = about_forces(found)
+    off = found.parameters.vector - JointTeam().identify(log).parameters.vector
+    assert (np.abs(off) < 2 * np.sqrt(np.diag(found.covariance))).all()
     assert finding.code == "wrench-unexplained"
     assert "What 'robot1' pushes fits neither" in finding.message
     assert "turned by about 30 deg" in finding.message
