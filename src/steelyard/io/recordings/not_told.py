@@ -108,6 +108,7 @@ def own_lines(table: Table, names: Names) -> dict[str, str]:
     if not ATTITUDES & set(lines) and (found := joints(names)):
         unit = angle_unit(values(table, found)) or "rad"
         lines["joint_position"] = _line(table, found, f'unit = "{unit}"', "from base to sensor")
+        lines.pop("position", None)  # which joints tell, too
     return lines
 
 
