@@ -15,7 +15,7 @@ from steelyard.io.recordings.description import Description, parse_description
 from steelyard.io.recordings.stream_files import open_table, open_tables, own_rows, read_cells, streams_of
 from steelyard.io.streams.channels import without_missing
 from steelyard.io.streams.entries import StreamSpec
-from steelyard.io.tables.files import Columns, Table, find_file
+from steelyard.io.tables.files import Columns, Table, data_folder, find_file
 from steelyard.logs.recording import QUANTITIES, Recording, Stream
 from steelyard.robots.serial import SerialArm
 
@@ -30,7 +30,7 @@ def read_recording(path: Path | str, data: Path | str | None = None) -> Recordin
     Raises BadFile, BadDescription or BadValue: what was expected, what was found, where, and what to do.
     """
     try:
-        return _read(Path(path), None if data is None else Path(data))
+        return _read(Path(path), data_folder(data))
     except OSError as error:
         raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
 
