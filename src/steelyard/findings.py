@@ -109,7 +109,7 @@ OTHER_FRAME: dict[str, str] = {
 # And where a bare data file was read, or rows were typed: no description is there to be corrected.
 BARE: dict[str, str] = {
     "wrench-sign-flipped": "Nothing to do if z of the world points up: the answer has the sign found. To say the sign, "
-    'write a description (.toml) of a file with these rows: wrench = "on-sensor" or "on-object" in [log], and gravity.',
+    'set wrench = "on-sensor" or "on-object" and gravity in [log] of what `steelyard identify FILE --describe` writes.',
 }
 
 
