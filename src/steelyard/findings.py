@@ -48,7 +48,7 @@ REMEDIES: dict[str, str] = {
     "views-disagree": "Check the hand-eye calibration, camera.json, and that each pose belongs to its image.",
     "object-cut": "Move the camera back, or aim it at the middle, so that most images hold the whole object.",
     "several-objects": "Scan one object at a time, or check that the one kept is the one meant.",
-    "cloud-in-mm": "Give the points in metres; they were read as millimetres.",
+    "cloud-in-mm": "Give the points in metres.",
     "thin-thickened": "Scan thin walls more densely, with normals from the views, or give the object as a mesh.",
     "cloud-thinned": "Nothing to do; give fewer points if you want to choose them yourself.",
     "cloud-noisy": "Nothing to do; points with less noise show thinner walls.",
@@ -109,7 +109,7 @@ OTHER_FRAME: dict[str, str] = {
 # And where a bare data file was read, or rows were typed: no description is there to be corrected.
 BARE: dict[str, str] = {
     "wrench-sign-flipped": "Nothing to do if z of the world points up: the answer has the sign found. To say the sign, "
-    'write a description (.toml) of a file with these rows: wrench = "on-sensor" or "on-object" in [log], and gravity.',
+    'set wrench = "on-sensor" or "on-object" and gravity in [log] of what `steelyard identify FILE --describe` writes.',
 }
 
 

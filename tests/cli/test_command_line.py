@@ -242,6 +242,16 @@ def test_a_log_or_the_pendant(arguments: list[str]) -> None:
     assert text == "Give either a LOG or --pendant. Example: steelyard identify log.toml"
 
 
+def test_a_bare_table_that_can_be_read_is_described_on_request(tmp_path: Path) -> None:
+    header = "t,fx,fy,fz,tx,ty,tz,qw,qx,qy,qz"
+    (tmp_path / "a.csv").write_text("\n".join([header, *(f"{k / 100},1,2,3,4,5,6,1,0,0,0" for k in range(20))]))
+    run = steelyard("identify", tmp_path / "a.csv", "--describe", "-o", tmp_path / "none.json")
+    assert (run.status, run.err) == (0, "")
+    assert run.out.startswith("[log]\n")
+    assert run.out.endswith('rotation = { columns = ["qw", "qx", "qy", "qz"], form = "quaternion-wxyz" }\n')
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+
+
 def test_an_object_of_no_size(made: Path) -> None:
     text = steelyard("identify", made, "--object-size", "0").failed(2)
     assert text == "object_size must be 0.005 to 5 m; got 0.0."

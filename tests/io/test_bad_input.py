@@ -14,7 +14,7 @@ import pytest
 from refused import message
 
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue, MissingDependency
-from steelyard.io import read_recording
+from steelyard.io import read_recording, read_team
 from steelyard.io.example import EXAMPLE
 
 HEADER = "t,fx,fy,fz,tx,ty,tz,qw,qx,qy,qz\n"
@@ -170,11 +170,22 @@ def test_rotation_that_is_a_mirror_image(tmp_path: Path) -> None:
 
 def test_missing_data_file_names_the_searched_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("STEELYARD_DATA", str(tmp_path / "env"))
+    (tmp_path / "data").mkdir()
     path = write(tmp_path, swap(TOML, '"a.csv"', '"b.csv"'))
     assert message(path, BadFile, tmp_path / "data") == (
         'log.toml, [[stream]] 1 ("b.csv"): "b.csv" was not found. Searched: DIR/data, DIR/env, DIR. '
         "Correct the path, or give the folder of the data with --data DIR or STEELYARD_DATA."
     )
+
+
+@pytest.mark.parametrize("read", [read_recording, read_team])
+def test_a_folder_of_data_that_is_not_there_is_named(tmp_path: Path, read: Callable[..., object]) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "log.toml").write_text(EXAMPLE)
+    for wrong in (tmp_path / "none", tmp_path / "file"):
+        with pytest.raises(BadFile) as caught:
+            read(tmp_path / "log.toml", wrong)
+        assert str(caught.value) == f"--data (in Python data): {wrong}: no such folder. Correct it, or leave it out."
 
 
 def test_missing_tool_names_the_line_that_asks_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -307,6 +307,35 @@ def test_joints_that_were_measured_are_suggested_not_those_that_were_wanted(tmp_
     assert 'joint_position = { columns = ["actual_q_0", "actual_q_1", ' in str(caught.value)
 
 
+RTDE = [f"actual_TCP_force_{k}" for k in range(6)]
+BARE_WRENCH = [f"ft_raw_wrench_{k}" for k in range(6)]
+
+
+@pytest.mark.parametrize("wrench", [RTDE, BARE_WRENCH])
+@pytest.mark.parametrize("joints", [[f"actual_q_{k}" for k in range(6)], [f"q{k}" for k in range(6)]])
+@pytest.mark.parametrize("more", ["", "target_q", "actual_qd", "actual_TCP_speed", "joint_torques", "x"])
+def test_of_what_tool_and_joints_have_only_places_are_suggested(
+    tmp_path: Path, wrench: list[str], joints: list[str], more: str
+) -> None:
+    extra = ["x", "y", "z"] if more == "x" else [f"{more}_{k}" for k in range(6)] if more else []
+    header = ["timestamp", *extra, *wrench, *joints]
+    with pytest.raises(BadDescription, match="Check this one, made of its names") as caught:
+        table(tmp_path, ",".join(header), TIME, np.tile(WRENCH, 3)[:, : len(header) - 1])
+    lines = str(caught.value).splitlines()
+    assert any(line.startswith("joint_position") and f'["{joints[0]}"' in line for line in lines)
+    assert [line.split(" ")[0] for line in lines if "columns = " in line] == [
+        *("time", "force", "torque", "joint_position")
+    ]  # and so no column for two of them
+
+
+@pytest.mark.parametrize("more", [[], ["actual_qd"], ["actual_TCP_speed"], ["target_TCP_pose"]])
+def test_a_wrench_of_the_tool_is_no_pose_of_it(tmp_path: Path, more: list[str]) -> None:
+    header = ["timestamp", *RTDE, *(f"{name}_{k}" for name in more for k in range(6))]
+    with pytest.raises(BadDescription, match="put your columns here; those of another file") as caught:
+        table(tmp_path, ",".join(header), TIME, np.tile(WRENCH, 2)[:, : len(header) - 1])
+    assert "position " not in str(caught.value)
+
+
 def test_gravity_that_a_bare_file_does_not_say_is_as_sure_as_the_earth_is_round(tmp_path: Path) -> None:
     assumed = arrays(tmp_path, time=TIME, force=FORCE, torque=TORQUE, rotation=TURN.matrix)
     down = TURN.inverse().apply(np.tile([0, 0, -9.81], (ROWS, 1)))

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from steelyard.errors import BadDescription, BadValue, NoDescription
+from steelyard.errors import BadDescription, BadFile, BadValue, NoDescription
 from steelyard.io import read_pendant, read_recording
+from steelyard.io.log_files import describe_file
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
 from steelyard.spatial import Rotation
 
@@ -316,7 +317,7 @@ def test_a_file_that_does_not_say_gravity_has_a_note_of_what_was_assumed(tmp_pat
     wrench = ["t", "fx", "fy", "fz", "tx", "ty", "tz"]
     bare(tmp_path, [*wrench, "qw", "qx", "qy", "qz"], [0, *W, *Q], [0.01, *W, *Q])
     assert read_recording(tmp_path / "data.csv").notes == (
-        "the file does not say gravity: 9.80665 ± 0.015 m/s² along -z of the world was assumed, the spread from equator to pole, which the bar of the mass holds (that of your place, in [log] gravity of a description, narrows it)",
+        "the file does not say gravity: 9.80665 ± 0.015 m/s² along -z of the world was assumed, the spread from equator to pole, which the bar of the mass holds (that of your place narrows it, in [log] gravity of a description, which `steelyard identify FILE --describe` writes)",
     )
     bare(tmp_path, [*wrench, "gx", "gy", "gz"], [0, *W, 0, 0, -9.82], [0.01, *W, 0, 0, -9.82])
     assert read_recording(tmp_path / "data.csv").notes == ()
@@ -425,6 +426,44 @@ def test_topics_that_plotjuggler_joined_are_streams_of_their_own(tmp_path: Path)
     assert set(pose.channels) == {"position", "rotation"}
     assert len(wrench) == len(pose) == 10
     assert wrench.channels["force"].tolist() == [W[:3]] * 10
+
+
+def test_a_description_of_a_bare_file_reads_as_the_file_does(tmp_path: Path) -> None:
+    wrench, turn = "fx,fy,fz,tx,ty,tz", "qw,qx,qy,qz"
+    turned = [Rotation.exp([0.2 * k, 0.0, 0.1]).quaternion_wxyz() for k in range(20)]
+    said = [",".join(f"{v:g}" for v in [*W, *q]) for q in turned]
+    tables = {
+        "joined": joined_rows().splitlines(),
+        "clocked": [f"t_ms,{wrench},{turn}", *(f"{10 * k},{row}" for k, row in enumerate(said))],
+        "two stamps": [f"sec,nanosec,{wrench},{turn}", *(f"1700000000,{k}0000000,{row}" for k, row in enumerate(said))],
+        "still poses": [f"{wrench},{turn}", *said],
+        "own gravity": [f"t,{wrench},gravity_x,gravity_y,gravity_z"]
+        + [f"{k / 100},{','.join(map(str, W))},0,0,-9.82" for k in range(20)],
+    }
+    for name, rows in tables.items():
+        path = tmp_path / f"{name}.csv"
+        path.write_text("\n".join(rows))
+        (tmp_path / "log.toml").write_text(describe_file(path))
+        read, told = read_recording(path), read_recording(tmp_path / "log.toml")
+        assert told.described
+        np.testing.assert_array_equal(read.gravity, told.gravity)
+        assert read.gravity_std == told.gravity_std
+        for one, other in zip(read.streams, told.streams, strict=True):
+            assert (one.poses, one.time is None) == (other.poses, other.time is None)
+            if one.time is not None:
+                np.testing.assert_array_equal(one.time, other.time)
+            assert set(one.channels) == set(other.channels)
+            for quantity in one.channels:
+                np.testing.assert_array_equal(one.channels[quantity], other.channels[quantity])
+
+
+def test_a_table_that_needs_a_description_is_described_by_its_example(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text("a,b,c\n1,2,3\n")
+    with pytest.raises(NoDescription) as caught:
+        read_recording(tmp_path / "data.csv")
+    assert describe_file(tmp_path / "data.csv") == caught.value.example
+    with pytest.raises(BadFile, match="unknown kind of data file"):
+        describe_file(Path(tmp_path / "data.csv").rename(tmp_path / "log.toml"))
 
 
 def test_joined_topics_said_to_be_one_stream_are_told_apart(tmp_path: Path) -> None:

@@ -508,7 +508,8 @@ def test_data_folder_then_environment_then_beside_the_description(
     monkeypatch.setenv("STEELYARD_DATA", str(tmp_path / "environment"))
     assert found(None) == 1
     assert found(tmp_path / "data") == 2
-    assert found(tmp_path / "not here") == 1
+    (tmp_path / "empty").mkdir()
+    assert found(tmp_path / "empty") == 1
 
 
 # --- limits of rotations and of one g --------------------

@@ -257,6 +257,8 @@ def test_what_would_be_small_in_millimetres_may_be_centimetres_or_inches() -> No
     )
     (found,) = enclose(Cloud(1000 * seen)).findings
     assert found.message.endswith("the object is then 304 mm long.")
+    assert "read as millimetres" in found.message
+    assert found.remedy == "Give the points in metres."
 
 
 def test_what_is_too_small_to_hold_is_said(brick: Sheet) -> None:

@@ -64,14 +64,19 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
     help='What the parts may be made of [kg/m^3]: "steel=7850, rubber=1150+-5%" (2 % where nothing is said).',
 )
 @click.option("--pendant", is_flag=True, help="Type poses and readings by hand, one pose per line.")
+@click.option("--describe", is_flag=True, help="Print a description of LOG, a data file or bag, and do nothing else.")
 @RESULT_FILE
 @RESULT_AS_JSON
 def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path | None, scan: Path | None,
-             pendant: bool, pose_in_sensor: str | None, materials: str | None, output: Path | None, as_json: bool,
-             **chosen: Any) -> None:  # fmt: skip
+             pendant: bool, pose_in_sensor: str | None, materials: str | None, describe: bool, output: Path | None,
+             as_json: bool, **chosen: Any) -> None:  # fmt: skip
     """Identify what a robot holds from LOG: a description (.toml) or a data file with the usual column names."""
-    if pendant == (log is not None):
+    if pendant == (log is not None) or (pendant and describe):
         raise BadValue("Give either a LOG or --pendant. Example: steelyard identify log.toml")
+    if describe:
+        from steelyard.io.log_files import describe_file
+
+        return tell(describe_file(cast(Path, log), data), nl=False)
     place = None if pose_in_sensor is None or "{" in pose_in_sensor else Path(pose_in_sensor)
     require_output(output, "a result", [".json"], log, tool, parts, scan, place)
     say_if_compiling()

@@ -7,15 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from steelyard import check
-from steelyard.errors import BadDescription, BadFile, BadValue
+from steelyard.errors import BadDescription, BadFile, BadValue, NoDescription
 from steelyard.io.contents import load_toml
 from steelyard.io.recordings import guess
 from steelyard.io.recordings.arm_joints import arm_of, posed, with_joints_in_order
 from steelyard.io.recordings.description import Description, parse_description
+from steelyard.io.recordings.description_text import description_text
 from steelyard.io.recordings.stream_files import open_table, open_tables, own_rows, read_cells, streams_of
 from steelyard.io.streams.channels import without_missing
 from steelyard.io.streams.entries import StreamSpec
-from steelyard.io.tables.files import Columns, Table, find_file
+from steelyard.io.tables.files import Columns, Table, data_folder, find_file
 from steelyard.logs.recording import QUANTITIES, Recording, Stream
 from steelyard.robots.serial import SerialArm
 
@@ -30,14 +31,34 @@ def read_recording(path: Path | str, data: Path | str | None = None) -> Recordin
     Raises BadFile, BadDescription or BadValue: what was expected, what was found, where, and what to do.
     """
     try:
-        return _read(Path(path), None if data is None else Path(data))
+        return _read(Path(path), data_folder(data))
     except OSError as error:
         raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
 
 
+def describe_file(path: Path | str, data: Path | str | None = None) -> str:
+    """Return the description (TOML) of a bare data file or bag, to be saved beside it and added to.
+
+    What only its user can tell is marked, to be filled in. Raises BadInput where there is nothing to be described.
+    """
+    path = _found(Path(path), data_folder(data))
+    try:
+        table = open_table(path)
+        return description_text(guess.describe(table)[0], table)
+    except NoDescription as error:
+        if not error.example:
+            raise
+        return error.example
+    except OSError as error:
+        raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
+
+
+def _found(path: Path, data: Path | None) -> Path:
+    return path if path.exists() else find_file(str(path), Path.cwd(), data)
+
+
 def _read(path: Path, data: Path | None) -> Recording:
-    if not path.exists():
-        path = find_file(str(path), Path.cwd(), data)
+    path = _found(path, data)
     if path.suffix.lower() != ".toml":
         table = open_table(path)
         description, cells = guess.describe(table)

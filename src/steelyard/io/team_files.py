@@ -17,7 +17,7 @@ from steelyard.io.recordings.arm_joints import arm_of, pose_channels, posed, wit
 from steelyard.io.recordings.description import default_gravity
 from steelyard.io.recordings.stream_files import open_tables, read_cells, streams_of
 from steelyard.io.streams.entries import StreamSpec
-from steelyard.io.tables.files import Columns, Table, find_file
+from steelyard.io.tables.files import Columns, Table, data_folder, find_file
 from steelyard.io.teams.team_description import RecordingSpec, RobotSpec, TeamDescription, parse_team_description
 from steelyard.logs.recording import Stream
 from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRobot
@@ -42,7 +42,7 @@ def read_team(path: Path | str, data: Path | str | None = None) -> TeamLog:
     second "still" of one robot with the second "still" of the others. Rows that miss a number are masked.
     Raises BadFile, BadDescription or BadValue: what was expected, what was found, where, and what to do.
     """
-    path, folder = Path(path), None if data is None else Path(data)
+    path, folder = Path(path), data_folder(data)
     try:
         if not path.exists():
             path = find_file(str(path), Path.cwd(), folder)

@@ -8,7 +8,7 @@ six or seven a pose: those only a description can tell.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -26,6 +26,12 @@ _OTHERS = {"d", "c", "cam", "camera", "object", "obj", "marker", "tag"}  # what 
 _JOINTS = {"q", "joint", "joints", "qpos", "angles", "jointpositions"}
 _JOINT_STEMS = ("q", "j", "joint", "joint_", "a")
 _POSES = {"pose", "poses", "tcp", "ee", "eef", "position", "transform"}
+# Words of what is neither a pose nor an angle, although tool or joints have it: `actual_TCP_force`, `tcp_speed`.
+_NO_PLACE = {
+    *("force", "forces", "torque", "torques", "moment", "moments", "wrench", "ft", "effort", "efforts", "output"),
+    *("speed", "speeds", "vel", "velocity", "velocities", "twist", "acc", "accel", "acceleration", "accelerations"),
+    *("current", "currents", "voltage", "voltages", "temperature", "temperatures", "mode", "offset", "error", "errors"),
+}
 
 
 def counted(plain: Mapping[str, int]) -> dict[str, tuple[int, ...]]:
@@ -94,8 +100,8 @@ def open_quaternion(names: Names) -> tuple[tuple[int, ...], bool]:
 
 def joints(names: Names) -> tuple[int, ...]:
     """Return six or seven columns that are the angles of an arm's joints by name; nothing without."""
-    for name, run in names.counted.items():
-        if len(run) in (6, 7) and _JOINTS & set(name.split("_")) and not WANTED & set(name.split("_")):
+    for words, run in _six_or_seven(names):
+        if _JOINTS & words:
             return run
     found = ([names.plain.get(f"{stem}{start + k}") for k in range(7)] for stem in _JOINT_STEMS for start in (0, 1))
     whole = (tuple(n for n in seven if n is not None) for seven in found if None not in seven[:6])
@@ -104,8 +110,15 @@ def joints(names: Names) -> tuple[int, ...]:
 
 def open_pose(names: Names) -> tuple[int, ...]:
     """Return six or seven columns that are a pose by name: a position, then angles or a quaternion; else nothing."""
-    runs = ((name, run) for name, run in names.counted.items() if len(run) in (6, 7))
-    return next((run for name, run in runs if _POSES & set(name.split("_"))), ())
+    return next((run for words, run in _six_or_seven(names) if _POSES & words and not _JOINTS & words), ())
+
+
+def _six_or_seven(names: Names) -> Iterator[tuple[set[str], tuple[int, ...]]]:
+    """Yield the words and numbers of counted columns that may be a pose, or joints, as it was measured."""
+    for name, run in names.counted.items():
+        words = set(name.split("_"))
+        if len(run) in (6, 7) and not (WANTED | _NO_PLACE) & words:
+            yield words, run
 
 
 def values(table: Table, columns: Sequence[int]) -> Array | None:

@@ -157,7 +157,8 @@ def _gravity(specs: Sequence[QuantitySpec], cells: Columns) -> tuple[Array, tupl
     way = " along -z of the world" if any(spec.name == "rotation" for spec in specs) else ""
     return default_gravity(), (
         f"the file does not say gravity: {ASSUMED}{way} was assumed, the spread from equator to pole, which "
-        "the bar of the mass holds (that of your place, in [log] gravity of a description, narrows it)",
+        "the bar of the mass holds (that of your place narrows it, in [log] gravity of a description, which "
+        "`steelyard identify FILE --describe` writes)",
     )
 
 

@@ -45,10 +45,10 @@ def require_told(table: Table, names: Names, found: Sequence[str]) -> None:
 
 def left_out(table: Table, names: Names) -> tuple[str, ...]:
     """Return a note on columns that seem to be the orientation, and were not read because they do not say how."""
-    line = _open_lines(table, names).get("rotation")
-    if line is None:
+    text = _open_lines(table, names).get("rotation")
+    if text is None:
         return ()
-    shown = " ".join(line.split())
+    shown = " ".join(text.split())
     return (f"an orientation was left out, which only a description can say how to read: rotation = {shown}",)
 
 
@@ -95,19 +95,20 @@ def own_lines(table: Table, names: Names) -> dict[str, str]:
     if stamps:
         lines["time"] = _time_line(table, names, stamps)
     for quantity in ("force", "torque", "specific_force", "gravity", "position"):
-        if line := _vector_line(table, names, quantity):
-            lines[quantity] = line
+        if text := _vector_line(table, names, quantity):
+            lines[quantity] = text
     lines |= _open_lines(table, names)
     if turn := names.rotation():
-        lines["rotation"] = _line(table, [int(n) for n in turn.columns], f'form = "{turn.form}"', "S to W")
+        lines["rotation"] = line(table, [int(n) for n in turn.columns], f'form = "{turn.form}"', "S to W")
     elif (rotations := names.rotations())[1]:
         form, turns = rotations
-        lines["rotation"] = _line(table, turns[0], f'form = "{form}"', f"S to W{_or(table, turns)}")
+        lines["rotation"] = line(table, turns[0], f'form = "{form}"', f"S to W{_or(table, turns)}")
     for quantity, columns, rest, remark in names.of_controllers():
-        lines[quantity] = _line(table, columns, rest, remark)
+        lines[quantity] = line(table, columns, rest, remark)
     if not ATTITUDES & set(lines) and (found := joints(names)):
         unit = angle_unit(values(table, found)) or "rad"
-        lines["joint_position"] = _line(table, found, f'unit = "{unit}"', "from base to sensor")
+        lines["joint_position"] = line(table, found, f'unit = "{unit}"', "from base to sensor")
+        lines.pop("position", None)  # which joints tell, too
     return lines
 
 
@@ -125,14 +126,14 @@ def numbered_lines(table: Table) -> dict[str, str]:
 
 def _time_line(table: Table, names: Names, stamps: Sequence[int]) -> str:
     if len(stamps) > 1:
-        return _line(table, stamps, 'unit = ["s", "ns"]')
+        return line(table, stamps, 'unit = ["s", "ns"]')
     if told := names.said_unit(stamps[0]):
-        return _line(table, stamps, f'unit = "{told}"')
+        return line(table, stamps, f'unit = "{told}"')
     found = values(table, stamps) if stamps[0] not in names.dates else None
     unit, step = stamp_unit(found[:, 0]) if found is not None else (None, 0.0)
     if unit is None and step > SLOWEST:
         unit = next(unit for unit, longest in (("ms", 1e3), ("us", 1e6), ("ns", float("inf"))) if step < longest)
-    return _line(table, stamps, f'unit = "{unit or "s"}"', "check the unit: s, ms, us or ns")
+    return line(table, stamps, f'unit = "{unit or "s"}"', "check the unit: s, ms, us or ns")
 
 
 def _vector_line(table: Table, names: Names, quantity: str) -> str | None:
@@ -154,7 +155,7 @@ def _vector_line(table: Table, names: Names, quantity: str) -> str | None:
     frame = ""
     if names.of_base(quantity, found):
         frame, remark = ', frame = "W"', f"if in the base's axes; else without frame{_or(table, several)}"
-    return _line(table, found, f'unit = "{unit}"{frame}', remark)
+    return line(table, found, f'unit = "{unit}"{frame}', remark)
 
 
 def _or(table: Table, several: Sequence[tuple[int, ...]]) -> str:
@@ -175,7 +176,7 @@ def _open_lines(table: Table, names: Names) -> dict[str, str]:
         unit = length_unit(values(table, place))
         angles = angle_unit(values(table, turn)) or "rad"
         return {
-            "position": _line(table, place, f'unit = "{unit}"', _OF_S),
+            "position": line(table, place, f'unit = "{unit}"', _OF_S),
             "rotation": _quaternion_line(table, turn, False)
             if len(turn) == 4
             else _angle_line(table, turn, "rotation-vector", angles),
@@ -186,17 +187,17 @@ def _open_lines(table: Table, names: Names) -> dict[str, str]:
 def _quaternion_line(table: Table, columns: Sequence[int], scalar_first: bool) -> str:
     form, other = _ORDERS[::-1] if scalar_first else _ORDERS
     remark = f'S to W; or "{other}": the file does not tell which of the four is w'
-    return _line(table, columns, f'form = "{form}"', remark)
+    return line(table, columns, f'form = "{form}"', remark)
 
 
 def _angle_line(table: Table, columns: Sequence[int], form: str, unit: str) -> str:
     """Return the line of three angles; in degrees no maker gives a rotation vector."""
     form, other = ("rpy", "rotation-vector") if unit == "deg" or form == "rpy" else ("rotation-vector", "rpy")
     remark = f'S to W; check both: the form may be "{other}", too'
-    return _line(table, columns, f'form = "{form}", unit = "{unit}"', remark)
+    return line(table, columns, f'form = "{form}", unit = "{unit}"', remark)
 
 
-def _line(table: Table, columns: Sequence[int], rest: str, remark: str = "") -> str:
+def line(table: Table, columns: Sequence[int], rest: str, remark: str = "") -> str:
     """Return the line of a quantity: its columns by name, the rest, and what its user must know."""
     return f"{{ columns = {_columns(table, columns)}, {rest} }}{'   # ' if remark else ''}{remark}"
 

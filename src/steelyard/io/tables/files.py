@@ -69,6 +69,13 @@ class Table(Protocol):
         """Return columns by number, float64; those in `exact` stay int64 where the file writes integers."""
 
 
+def data_folder(data: Path | str | None) -> Path | None:
+    """Return the folder of data that was given, if one was; raises BadFile where there is none."""
+    if data is not None and not Path(data).is_dir():
+        raise BadFile(f"--data (in Python data): {data}: no such folder. Correct it, or leave it out.")
+    return None if data is None else Path(data)
+
+
 def find_file(name: str, folder: Path, data: Path | None, asked: str = "") -> Path:
     """Return the file `name`, sought in `data`, $STEELYARD_DATA, `folder`; raises BadFile naming them.
 
