@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
-from steelyard.logs.smoothing import passed, smooth, smooth_rotations, turning
+from steelyard.logs.smooth_turns import smooth_rotations, turning
+from steelyard.logs.smoothing import passed, smooth
 from steelyard.spatial import Rotation
 
 

@@ -11,7 +11,8 @@ from steelyard.check import Array
 from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.curve import Curve
 from steelyard.logs.recording import Stream, first_channels, no_rotation
-from steelyard.logs.smoothing import Smooth, smooth, smooth_rotations, turning
+from steelyard.logs.smooth_turns import smooth_rotations, turning
+from steelyard.logs.smoothing import Smooth, smooth
 from steelyard.spatial import Rotation, lever_acceleration
 
 # How late each stream's stamps are [s]: throughout, or at each of the times asked for.
