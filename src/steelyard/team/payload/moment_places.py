@@ -46,14 +46,12 @@ class MomentPlaces:
 
     ways      (3 N, U) in which they may differ from the grasps
     evidence  logarithm of how likely they are against none
-    moved     (10, 3 N) change of the parameters per metre
     """
 
     metres: Array
     covariance: Array
     ways: Array
     evidence: float
-    moved: Array
 
     @property
     def sure(self) -> bool:
@@ -62,11 +60,6 @@ class MomentPlaces:
         size = np.sqrt(flat @ np.linalg.pinv(self.covariance, rcond=1e-9, hermitian=True) @ flat)
         far = bool(np.abs(flat).max() > FAR_M and size > FAR_STD + np.sqrt(count - 1))
         return far and self.evidence > COUNTS
-
-    @property
-    def unsure(self) -> Array:
-        """The covariance (10, 10) of the parameters by that of the places."""
-        return np.asarray(self.moved @ self.covariance @ self.moved.T)
 
     def finding(self, names: Sequence[str]) -> Finding:
         """Return motion-mismatch with the places and whose they are."""
@@ -105,10 +98,12 @@ def with_moments_at_grasps(
     alone = own.reshape(len(own), -1, 3).swapaxes(0, 1)
     if not len(alone):
         return groups, fit, None
-    tried = [own] if len(alone) == 1 else [alone.sum(0), *alone, own]
-    found = _likeliest(fit, D, C, tried, np.zeros((len(six_axis), 3)))
+    nowhere, single = np.zeros((len(six_axis), 3)), list(alone) if len(alone) == 1 else [alone.sum(0), *alone]
+    found = _likeliest(fit, D, C, single, nowhere)
     if found.evidence < ASKED:
         return groups, fit, None
+    # Places for each, which cost as much as all other ways, are tried only where one of these is of use already.
+    found = max(found, _likeliest(fit, D, C, [own], nowhere), key=lambda one: one.evidence)
     read, better = groups, fit
     for _ in range(ROUNDS):
         read = _at_grasps(groups, found)
@@ -125,7 +120,8 @@ def with_moments_at_grasps(
     found = replace(found, evidence=judged.evidence)
     if not found.sure:
         return groups, fit, None
-    return read, replace(better, covariance=better.covariance + found.unsure), found
+    moved = moved_by(better, _levers(D))
+    return read, replace(better, covariance=better.covariance + moved @ found.covariance @ moved.T), found
 
 
 def _at_grasps(groups: tuple[Group, ...], places: MomentPlaces) -> tuple[Group, ...]:
@@ -137,10 +133,7 @@ def _at_grasps(groups: tuple[Group, ...], places: MomentPlaces) -> tuple[Group, 
 
 def _likeliest(fit: PayloadFit, D: Array, C: Array, tried: Sequence[Array], at: Array) -> MomentPlaces:
     """Return by how much places differ from `at` (N, 3), to which moments were taken, in the likeliest way (3 N, U)."""
-    count = len(at)
-    changes = np.zeros((count, 3, 6, 6))
-    changes[..., 3:] = (D.reshape(6, count, 1, 6).transpose(1, 2, 0, 3)[..., :3]) @ cross_matrix(np.eye(3))
-    plain, wide = _equations(fit, D, changes)
+    plain, wide = _equations(fit, D)
     # Beside places a bias that lasts is one of every recording.
     ladder = ladder_of(1, False)
     none = Models.of(plain, C, ladder, fit.scale)
@@ -151,14 +144,13 @@ def _likeliest(fit: PayloadFit, D: Array, C: Array, tried: Sequence[Array], at: 
     best, ways = max(zip(models, tried, strict=True), key=lambda one: one[0].evidence)
     mean = best.mean()
     covariance = ways @ best.covariance_about(mean)[10:, 10:] @ ways.T
-    moved = moved_by(fit, changes)
-    return MomentPlaces((ways @ mean[10:]).reshape(-1, 3), covariance, ways, best.evidence - none.evidence, moved)
+    return MomentPlaces((ways @ mean[10:]).reshape(-1, 3), covariance, ways, best.evidence - none.evidence)
 
 
 def _along(wide: Sequence[Normal], ways: Array, at: Array) -> list[Normal]:
     """Return equations in [phi, u, bias] of those in [phi, places (3 N), bias], where places are ways u from `at`.
 
-    u is held to nought by what is usual, once for all recordings.
+    u, whose ways are at right angles, is held to nought by what is usual, once for all recordings.
     """
     count = ways.shape[1]
     T = np.zeros((len(wide[0].H), 16 + count))
@@ -166,29 +158,28 @@ def _along(wide: Sequence[Normal], ways: Array, at: Array) -> list[Normal]:
     inner, u = T[:-6, :-6], np.arange(10, 10 + count)
     out = [replace(n, H=T.T @ n.H @ T, g=T.T @ n.g, noise=inner.T @ n.noise @ inner) for n in wide]
     out[0].H[u, u] += USUAL_M**-2.0
-    out[0].g[u] -= np.linalg.lstsq(ways, at.ravel(), rcond=None)[0] * USUAL_M**-2.0
+    out[0].g[u] -= ways.T @ at.ravel() / (ways**2).sum(0) * USUAL_M**-2.0
     return out
 
 
-def _equations(fit: PayloadFit, D: Array, changes: Array) -> tuple[list[Normal], list[Normal]]:
-    """Return the normal equations of every recording without places and with those of all robots, in loud bands.
-
-    changes  (N, 3, 6, 6) of the summing blocks per metre
-    """
-    count = len(changes)
-    maps = np.zeros((count, 3, 6, count, 6))
-    maps[range(count), :, :, range(count)] = changes
+def _equations(fit: PayloadFit, D: Array) -> tuple[list[Normal], list[Normal]]:
+    """Return the normal equations of every recording without places and with those of all robots, in loud bands."""
     plain, wide = list[Normal](), list[Normal]()
     for whole, weights in zip(fit.groups, fit.weights, strict=True):
         group, W = _loud(whole, weights)
         each = group.normals(D, W)
         plain += each
         force = 6 / D.shape[1] * float(whole.wrench_noise[:, 3:].mean(1).min())
-        wide += [
-            _with_columns(one, part, D, W, maps.reshape(3 * count, 6, -1), force)
-            for one, part in zip(each, group.parts, strict=True)
-        ]
+        wide += [_with_columns(one, part, D, W, force) for one, part in zip(each, group.parts, strict=True)]
     return plain, wide
+
+
+def _levers(D: Array) -> Array:
+    """Return how the block (6, 6) that sums what a grasp pushes changes by a place of its moments, per metre and axis
+    (N, 3, 6, 6).
+    """
+    blocks = D.reshape(6, -1, 1, 6).transpose(1, 2, 0, 3)
+    return np.concatenate([np.zeros((blocks.shape[0], 3, 6, 3)), blocks[..., :3] @ cross_matrix(np.eye(3))], axis=3)
 
 
 def _loud(group: Group, W: Array) -> tuple[Group, Array]:
@@ -201,20 +192,25 @@ def _loud(group: Group, W: Array) -> tuple[Group, Array]:
     return Group(parts, group.motion_noise[loud], group.wrench_noise[loud], sighted=False), W[loud]
 
 
-def _with_columns(normal: Normal, part: Spectra, D: Array, W: Array, maps: Array, force: float) -> Normal:
-    """Return the equations of a recording with U columns that maps (U, 6, 6 N) make of the pushes.
+def _with_columns(normal: Normal, part: Spectra, D: Array, W: Array, force: float) -> Normal:
+    """Return the equations of a recording with columns of all places (3 N), before the bias.
 
     force  [N^2] noise of a force, which is in the columns and in the sum: it would explain itself
     """
-    S, T, count = part.scatter, regressors(NO_LEVERS), len(maps)
-    pushes, flat = S[:, 12:-1], -maps.reshape(count, -1)
-    weighed = -(W[:, None] @ maps)
-    seen = (weighed @ pushes[:, None, :, 12:-1]).sum(0).reshape(count, -1)
-    noisy = -(np.tensordot(force * part.rows, W, 1) @ maps).reshape(count, -1)
-    across = (weighed @ pushes[:, None, :, SEEN]).sum(0).reshape(count, -1) @ T.reshape(16, -1).T
+    S, T, forces = part.scatter, regressors(NO_LEVERS), np.arange(D.shape[1]).reshape(-1, 6)[:, 3:]
+    levers = _levers(D)[..., 3:]
+    robots, count = len(levers), 3 * len(levers)
+    columns = np.zeros((robots, 3, 6, D.shape[1]))
+    for column, lever, own in zip(columns, levers, forces, strict=True):
+        column[..., own] = -lever
+    flat, weighed = columns.reshape(count, -1), -(W[:, None, None] @ levers).reshape(len(W), robots, 18, 3)
+    alone = force * part.rows[:, None, None] * np.eye(S.shape[2])
+    seen, noisy = ((weighed @ some[:, 12 + forces]).sum(0).reshape(count, 6, -1) for some in (S, alone))
+    pushed, noise_pushed = (some[..., 12:-1].reshape(count, -1) for some in (seen, noisy))
+    across = seen[..., SEEN].reshape(count, -1) @ T.reshape(16, -1).T
     old, u = np.r_[:10, 10 + count : 16 + count], np.arange(10, 10 + count)
     H, g, noise = np.zeros((16 + count, 16 + count)), np.zeros(16 + count), np.zeros((10 + count, 10 + count))
     H[np.ix_(old, old)], g[old], noise[:10, :10] = normal.H, normal.g, normal.noise
-    H[np.ix_(u, u)], H[np.ix_(u, old)], H[np.ix_(old, u)] = seen @ flat.T, across, across.T
-    g[u], noise[10:, 10:] = (seen - noisy) @ D.ravel(), noisy @ flat.T
+    H[np.ix_(u, u)], H[np.ix_(u, old)], H[np.ix_(old, u)] = pushed @ flat.T, across, across.T
+    g[u], noise[10:, 10:] = (pushed - noise_pushed) @ D.ravel(), noise_pushed @ flat.T
     return replace(normal, H=H, g=g, noise=noise)
