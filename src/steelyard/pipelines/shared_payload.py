@@ -22,7 +22,6 @@ from steelyard.logs.recording import STANDARD_GRAVITY
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_steady import with_steady_tracks
 from steelyard.pipelines.lacking import missing_rows, missing_wrenches, repeated_rows
-from steelyard.pipelines.telling import MISREAD
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.lags import together
 from steelyard.team.estimate import TeamEstimate
@@ -99,7 +98,7 @@ def _with_clocks(found: TeamEstimate, apart: ClockErrors, log: TeamLog) -> TeamE
 
 def _remedied(found: TeamEstimate) -> TeamEstimate:
     """Return the estimate with remedies that help where its wrenches are no body's."""
-    return found.with_remedies(UNEXPLAINED) if found.codes() & MISREAD else found
+    return found.with_remedies(UNEXPLAINED) if "wrench-unexplained" in found.codes() else found
 
 
 def _with_gravity(found: TeamEstimate, log: TeamLog) -> TeamEstimate:

@@ -15,9 +15,9 @@ from steelyard.check import Array
 from steelyard.findings import Finding, quoted
 from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.misread.forces import likely_factor
-from steelyard.team.misread.signs import torque_factor
+from steelyard.team.misread.signs import torque_factor, with_torque_sensor
 from steelyard.team.payload.fit import PayloadFit
-from steelyard.team.payload.model import Group, weight
+from steelyard.team.payload.model import Group, scatter, weight
 
 # What is left counts from this share of the payload's weight, and from so many times the noise of the highest band;
 # noise below 2 Hz has less than three times it. Less is enough where one robot explains it.
@@ -52,17 +52,34 @@ def _with_lengths(found: Finding, size: float) -> Finding:
     return Finding(found.code, text, remedy)
 
 
-def covariance_of_unexplained(fit: PayloadFit) -> Array:
+def covariance_of_unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Array:
     """Return the covariance (10, 10) that what no payload explains adds: any of the parameters may be made of it.
 
-    The fit takes it for noise, which many rows average out; what is wrong in a force averages to nothing known.
+    The fit takes it for noise, which many rows average out; what is wrong in a force averages to nothing known. But no
+    force sensor makes moments alone wrong: below gimbals that is their friction, another in every recording.
     """
     size = float(fit.scale[1] / fit.scale[0])
-    left = (_worst(fit.groups, axes)[1:] for axes in (slice(3, 6), slice(0, 3)))
-    # What the highest band has as well is noise.
-    force, moment = (rms * np.sqrt(max(1 - coloured**-2.0, 0.0)) for rms, coloured in left)
-    mass, first = force / ROUNDED_GRAVITY, (force * size + moment) / ROUNDED_GRAVITY
+    if not with_torque_sensor(scatter(fit.groups)).size and not any(True for _ in _forces(fit, D, names)):
+        mass, first = 0.0, _friction(fit.groups) / ROUNDED_GRAVITY
+    else:
+        left = (_worst(fit.groups, axes)[1:] for axes in (slice(3, 6), slice(0, 3)))
+        # What the highest band has as well is noise.
+        force, moment = (rms * np.sqrt(max(1 - coloured**-2.0, 0.0)) for rms, coloured in left)
+        mass, first = force / ROUNDED_GRAVITY, (force * size + moment) / ROUNDED_GRAVITY
     return np.asarray(np.diag(np.repeat([mass, first, first * size], [1, 3, 6])) ** 2)
+
+
+def _friction(groups: Sequence[Group]) -> float:
+    """Return what a mean of all recordings may keep of the moment about an axis that is left beyond noise [N m].
+
+    Of slow moments only the lowest frequencies hold any, so that they count over all samples, not over those.
+    """
+    kinds = []
+    for group in groups:
+        rows = np.sum([part.rows for part in group.parts], axis=0)
+        power = group.wrench_noise[:, :3].mean(1)
+        kinds.append(float(rows @ np.maximum(power - power[-1], 0.0)) / sum(part.samples for part in group.parts))
+    return float(np.sqrt(max(kinds) / sum(len(group.parts) for group in groups)))
 
 
 def _forces(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
@@ -116,6 +133,8 @@ def _moments(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Findin
         "Centre of mass and inertia are not to be trusted."
     )
     remedy = f"Check unit, order and signs of the torque columns of {who}, and where its sensor sits beside its grasp."
+    if not with_torque_sensor(scatter(fit.groups)).size:
+        remedy = "Check the gimbals for friction, and cables that pull on the payload; bars hold what friction may do."
     yield Finding("wrench-unexplained", text, remedy)
 
 

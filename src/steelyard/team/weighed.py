@@ -28,6 +28,7 @@ from steelyard.team.payload.fit import PayloadFit, Weighing, fit_payload
 from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.late_forces import with_timely_forces
 from steelyard.team.payload.model import Group, unit_bias, units_of_body
+from steelyard.team.payload.moment_places import with_moments_at_grasps
 from steelyard.team.payload.spectra import band_edges, gathered, motion_noise
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.yielding import Yields
@@ -100,8 +101,16 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         groups = _groups(rows, seen.path, highest_hz, motion.ORDER)
         groups = tuple(replace(group, sighted=known) for group in groups)
         groups, read, taken = _with_forces_read(groups, D, log.names) if known else (groups, (), {})
-        given = _summing_given(D, log.names, taken)
-        return Weighing(groups, given, read, taken, fit_payload(groups, D, C, size, with_gain))
+        fit = fit_payload(groups, D, C, size, with_gain)
+        if known:
+            groups, fit, places = with_moments_at_grasps(
+                groups, fit, lambda some: fit_payload(some, D, C, size, with_gain), D, C, six_axis
+            )
+            if places is not None:
+                moved = places.taken(log.names)
+                taken = {**taken, **{name: M @ taken.get(name, np.eye(6)) for name, M in moved.items()}}
+                read = (*read, places.finding(log.names))
+        return Weighing(groups, _summing_given(D, log.names, taken), read, taken, fit)
 
     C = unit_bias(D, six_axis, size)
     standing, propped = unpropped(seen.rows, fitted, D, highest_hz)
@@ -118,7 +127,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     told = any(one.code in TOLD for one in (*seen.findings, *read))
     wrong = () if told else tuple(unexplained(payload, D, log.names, placed=not spread.blind.size))
     if wrong or (read and not first.taken):  # what is named and not put right is in the forces still
-        payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
+        payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload, D, log.names))
     if late is not None:
         payload = replace(payload, covariance=payload.covariance + late.unsure(payload, D))
     if seen.yields is not None:

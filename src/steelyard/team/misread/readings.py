@@ -104,13 +104,22 @@ def in_few_words(taken: Array) -> str:
     """Return what was done to a wrench by its map (6, 6)."""
     torque, force = _words(taken[:3, :3]), _words(taken[3:, 3:])
     if torque == force:
-        return f"wrench {force}"
-    return ", ".join(f"{what} {said}" for what, said in (("force", force), ("torque", torque)) if said)
+        said = [f"wrench {force}"] if force else []
+    else:
+        said = [f"{what} {done}" for what, done in (("force", force), ("torque", torque)) if done]
+    lever = taken[:3, 3:] @ np.linalg.inv(taken[3:, 3:])
+    if lever.any():
+        place = ", ".join(f"{1e3 * x:.0f}" for x in (lever[2, 1], lever[0, 2], lever[1, 0]))
+        said.append(f"torque from ({place}) mm")
+    return ", ".join(said)
 
 
 def _mapped(track: Track, taken: Array) -> Track:
-    blocks = {"torque": taken[:3, :3], "force": taken[3:, 3:]}
-    more = {name: track.channels[name] @ X.T for name, X in blocks.items() if name in track.channels}
+    there = [(name, rows) for name, rows in (("torque", slice(3)), ("force", slice(3, 6))) if name in track.channels]
+    more = {
+        name: np.sum([track.channels[other] @ taken[rows, own].T for other, own in there], axis=0)
+        for name, rows in there
+    }
     return replace(track, channels={**track.channels, **more})
 
 

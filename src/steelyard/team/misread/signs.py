@@ -43,7 +43,7 @@ def torques_of_other_sign(groups: Sequence[Group], D: Array) -> int | None:
     D  (6, 6 N) sums the pushes at B
     """
     S = scatter(groups)
-    left = {i: _moments_left(S, D, i, -1.0) for i in _with_torque_sensor(S)}
+    left = {i: _moments_left(S, D, i, -1.0) for i in with_torque_sensor(S)}
     fall = [i for i in left if left[i] * TORQUES_FALL < _moments_left(S, D, i, 1.0)]
     return min(fall, key=left.__getitem__, default=None)
 
@@ -51,7 +51,7 @@ def torques_of_other_sign(groups: Sequence[Group], D: Array) -> int | None:
 def torque_factor(groups: Sequence[Group], D: Array) -> tuple[int, float] | None:
     """Return the one robot whose torques balance moments times a factor, and that factor; None where none does."""
     S, best = scatter(groups), []
-    for i in _with_torque_sensor(S):
+    for i in with_torque_sensor(S):
         none, given, turned = (_moments_left(S, D, i, times) for times in (0.0, 1.0, -1.0))
         bend = (given + turned) / 2 - none
         if bend > 0:
@@ -62,7 +62,7 @@ def torque_factor(groups: Sequence[Group], D: Array) -> tuple[int, float] | None
     return min(best)[1:]
 
 
-def _with_torque_sensor(S: Array) -> Integers:
+def with_torque_sensor(S: Array) -> Integers:
     """Return the robots that measure torques."""
     own = np.diag(S)[12:-1].reshape(-1, 6)[:, :3]
     return np.flatnonzero(own.any(1)).astype(np.int64)
