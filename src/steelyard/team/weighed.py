@@ -102,7 +102,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         groups = tuple(replace(group, sighted=known) for group in groups)
         groups, read, taken = _with_forces_read(groups, D, log.names) if known else (groups, (), {})
         fit = fit_payload(groups, D, C, size, with_gain)
-        if known:
+        if known and (taken or not read):  # forces that are misread, and left so, tell no places
             groups, fit, places = with_moments_at_grasps(
                 groups, fit, lambda some: fit_payload(some, D, C, size, with_gain), D, C, six_axis
             )
