@@ -52,14 +52,17 @@ def _with_lengths(found: Finding, size: float) -> Finding:
     return Finding(found.code, text, remedy)
 
 
-def covariance_of_unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Array:
+def covariance_of_unexplained(fit: PayloadFit, D: Array, names: Sequence[str], forces: bool) -> Array:
     """Return the covariance (10, 10) that what no payload explains adds: any of the parameters may be made of it.
 
     The fit takes it for noise, which many rows average out; what is wrong in a force averages to nothing known. But no
     force sensor makes moments alone wrong: below gimbals that is their friction, another in every recording.
+
+    forces  whether it is known that forces are wrong
     """
     size = float(fit.scale[1] / fit.scale[0])
-    if not with_torque_sensor(scatter(fit.groups)).size and not any(True for _ in _forces(fit, D, names)):
+    forces = forces or bool(with_torque_sensor(scatter(fit.groups)).size or list(_forces(fit, D, names)))
+    if not forces:
         mass, first = 0.0, _friction(fit.groups) / ROUNDED_GRAVITY
     else:
         left = (_worst(fit.groups, axes)[1:] for axes in (slice(3, 6), slice(0, 3)))

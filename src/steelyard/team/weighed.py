@@ -126,8 +126,10 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         require_lift(float(payload.parameters[0]), "the forces")
     told = any(one.code in TOLD for one in (*seen.findings, *read))
     wrong = () if told else tuple(unexplained(payload, D, log.names, placed=not spread.blind.size))
-    if wrong or (read and not first.taken):  # what is named and not put right is in the forces still
-        payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload, D, log.names))
+    left_so = bool(read) and not first.taken  # what is named and not put right is in the forces still
+    if wrong or left_so:
+        more = covariance_of_unexplained(payload, D, log.names, forces=left_so)
+        payload = replace(payload, covariance=payload.covariance + more)
     if late is not None:
         payload = replace(payload, covariance=payload.covariance + late.unsure(payload, D))
     if seen.yields is not None:
