@@ -18,7 +18,7 @@ from steelyard.spatial import Rotation
 
 MISREADINGS: dict[str, Callable[[Rotation], Rotation]] = {
     "turns W into S": lambda R: R.inverse(),
-    "order x, y, z, w, not w, x, y, z": lambda R: Rotation.from_quaternion_wxyz(np.roll(R.quaternion_wxyz(), 1, -1)),
+    "order w, x, y, z, not x, y, z, w": lambda R: Rotation.from_quaternion_wxyz(np.roll(R.quaternion_wxyz(), 1, -1)),
     "moving axes": lambda R: Rotation.from_rpy(-R.inverse().rpy()),
     "a rotation vector, not roll": lambda R: Rotation.from_rpy(R.log()),
 }
