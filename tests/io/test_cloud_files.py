@@ -77,6 +77,15 @@ def test_pcd(tmp_path: Path, kind: str) -> None:
     assert np.array_equal(read.rgb, CLOUD.rgb)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [(b"FIELDS", b"COLUMNS"), (b"POINTS 50\n", b""), (b"WIDTH 50\nHEIGHT 1\n", b"")]
+)
+def test_old_words_of_a_pcd_header(tmp_path: Path, old: bytes, new: bytes) -> None:
+    path = tmp_path / "cloud.pcd"
+    path.write_bytes(pcd("binary").replace(old, new))
+    assert np.array_equal(read_cloud(path).rgb, CLOUD.rgb)
+
+
 def test_runs_that_repeat_are_undone() -> None:
     from steelyard.io.shapes.pcd_files import _inflate
 
@@ -99,6 +108,7 @@ def packed(points: int) -> bytes:
         ("a.pcd", pcd("binary")[:-9], "ends before its 50 points"),
         ("a.pcd", pcd("binary_compressed")[:-9], "ends before its 50 points"),
         ("a.pcd", pcd("ascii").replace(b"FIELDS x y", b"FIELDS x"), "that fit each other"),
+        ("a.pcd", pcd("ascii").replace(b"SIZE", b"SIZES"), "found VERSION, FIELDS, SIZES, TYPE"),
         ("a.pcd", pcd("binary").replace(b"FIELDS x y", b"FIELDS x w"), '"y" is missing'),
         (
             "a.pcd",

@@ -46,13 +46,19 @@ def read_pcd(path: Path) -> dict[str, Any]:
 
 
 def _layout(path: Path, header: dict[str, list[str]]) -> tuple[np.dtype[Any], int]:
-    """Return the record of one point and the number of points."""
-    names = header.get("FIELDS", [])
+    """Return the record of one point and the number of points.
+
+    Read as the Point Cloud Library does: COLUMNS is what FIELDS was called once, and WIDTH x HEIGHT stands for POINTS.
+    """
+    names = header.get("FIELDS", header.get("COLUMNS", []))
     counts = header.get("COUNT", ["1"] * len(names))
     kinds = list(zip(header.get("TYPE", []), header.get("SIZE", []), strict=False))
-    unfit = BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.")
+    unfit = BadFile(
+        f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS (or WIDTH and HEIGHT) that fit each other; "
+        f"found {', '.join(header)}."
+    )
     try:
-        points = int(header["POINTS"][0])
+        points = int(header["POINTS"][0]) if "POINTS" in header else int(header["WIDTH"][0]) * int(header["HEIGHT"][0])
         widths = [int(width) for width in counts]
         types = [_TYPES[kind] for kind in kinds]
     except (KeyError, IndexError, ValueError):
