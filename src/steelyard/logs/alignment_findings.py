@@ -142,10 +142,9 @@ def planar_finding(gravity: Array) -> tuple[Finding, ...]:
     shown = ", ".join(f"{v:.2f}" for v in np.round(axis, 2) + 0.0)
     across = np.abs((gravity - gravity.mean(0)) @ axes[:, 0]) / size
     rms, most = np.degrees(np.arcsin(np.minimum([stds[0], across.max()], 1.0)))
-    message = (
-        f"Gravity leaves one plane in S by {rms:.1f} degrees rms, {most:.1f} at most; across that plane, along "
-        f"({shown}), only so much tells a load from a bias."
-    )
+    leaves = f"leaves one plane in S by {rms:.1f} degrees rms, {most:.1f} at most; across that plane, along ({shown}), "
+    stays = f"stays in one plane in S within 0.1 degrees; across it, along ({shown}), "
+    message = f"Gravity {stays + 'nothing' if most < 0.05 else leaves + 'only so much'} tells a load from a bias."
     return (Finding.of("nearly-planar", message),)
 
 
