@@ -2,13 +2,12 @@
 
 The signal is taken as the n-fold integral of white noise seen through white noise (a smoothing spline); one
 number, the ratio of the two, is chosen by the likelihood of the innovations.
-Source: Rauch, Tung, Striebel 1965; Wahba 1978 (spline as a posterior mean).
+Source: Wahba 1978 (spline as a posterior mean).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import factorial
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import lowpass, lowpass_gain
+from steelyard.logs.spline_filter import WARM_UP, backward, forward
 
 _SEARCH_ROWS = 6000
 _NOISE_FLOOR = 1e-9
@@ -27,7 +27,6 @@ _LONG = 20.0  # periods of a low-pass, from which on there is one
 SMEARED = 2.0  # periods of a low-pass over which an end is felt
 _FINE = 10.0  # times the cut-off
 _NOISY_END = 2.0  # times the median variance of a second derivative
-_WARM_UP = 6  # innovations left out of the likelihood: the start is not known
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +73,8 @@ def smooth(time: Array, values: Array, noise_dof: int | None = None, cutoff_hz: 
     Raises BadValue with fewer than 12 samples.
     """
     t, y = check.finite("time", time), check.finite("values", values)
-    if len(t) < 2 * _WARM_UP:
-        raise BadValue(f"smoothing needs at least {2 * _WARM_UP} samples in time; got {len(t)}.")
+    if len(t) < 2 * WARM_UP:
+        raise BadValue(f"smoothing needs at least {2 * WARM_UP} samples in time; got {len(t)}.")
     step = median_step(t)
     origin = y.mean(0)
     clock, centred = (t - t[0]) / step, np.ascontiguousarray(y - origin)
@@ -83,8 +82,9 @@ def smooth(time: Array, values: Array, noise_dof: int | None = None, cutoff_hz: 
     _, order, ratio = min(_best_ratio(clock, centred, n) for n in _ORDERS)
     scale = ratio ** (1 / (2 * order))
     floor = (_NOISE_FLOOR * (np.ptp(y, axis=0).max() + 1e-12)) ** 2
-    *forward, quad, _, count = _forward(clock * scale, centred, _model(order), scale, True)
-    states, cov = _backward(*forward)
+    scaled = clock * scale
+    states, cov, weights, quad, _, count = forward(scaled, centred, order, scale, True)
+    backward(scaled, centred, states, cov, weights)
     noise = max(quad / max(count * y.shape[1] * share, 1.0), floor)
     back = (scale / step) ** np.arange(order)
     bandwidth = scale / (2 * np.pi * step)
@@ -130,7 +130,7 @@ def _below(whole: Smooth, cutoff_hz: float) -> Smooth:
     states = lowpass(states.reshape(len(even), -1), cutoff_hz, rate).reshape(states.shape)
     end = round(SMEARED * rate / cutoff_hz)
     inner = slice(end, len(even) - end)
-    if len(even[inner]) < 2 * _WARM_UP:
+    if len(even[inner]) < 2 * WARM_UP:
         return whole
     return replace(whole, time=even[inner], states=check.frozen(states[inner]), variance=check.frozen(variance[inner]))
 
@@ -187,107 +187,5 @@ def _pieces(rows: int) -> list[slice]:
 
 
 def _likelihood(clock: Array, values: Array, order: int, scale: float) -> tuple[float, float, float]:
-    *_, quad, log_det, count = _forward(clock, values, _model(order), scale, False)
+    *_, quad, log_det, count = forward(clock, values, order, scale, False)
     return float(quad) / values.shape[1], float(log_det), float(count)
-
-
-def _model(order: int) -> tuple[Array, Array]:
-    """Return the coefficients of F(dt) and Q(dt), to be multiplied by powers of dt."""
-    F, Q = np.zeros((order, order)), np.zeros((order, order))
-    for i in range(order):
-        for j in range(order):
-            if j >= i:
-                F[i, j] = 1 / factorial(j - i)
-            a, b = order - 1 - i, order - 1 - j
-            Q[i, j] = 1 / (factorial(a) * factorial(b) * (a + b + 1))
-    return F, Q
-
-
-@njit(cache=True)
-def _forward(clock, values, model, density, keep):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Kalman filter with unit measurement noise and process density `density` in the given time unit.
-
-    What only the pass back needs is stored where it is to be kept.
-    """
-    base_F, base_Q = model
-    n, rows, channels = base_F.shape[0], values.shape[0], values.shape[1]
-    stored = rows if keep else 0
-    filtered, predicted = np.zeros((stored, n, channels)), np.zeros((stored, n, channels))
-    P_filtered, P_predicted = np.zeros((stored, n, n)), np.zeros((stored, n, n))
-    transition = np.zeros((stored, n, n))
-    x, P = np.zeros((n, channels)), 1e6 * np.eye(n)
-    x[0] = values[0]
-    F, Q, room, gain = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-    quad, log_det, count = 0.0, 0.0, 0
-    for k in range(rows):
-        if k > 0:
-            dt = clock[k] - clock[k - 1]
-            for i in range(n):
-                for j in range(n):
-                    F[i, j] = base_F[i, j] * dt ** max(j - i, 0)
-                    Q[i, j] = density * base_Q[i, j] * dt ** (2 * n - 1 - i - j)
-            _predict(x, P, F, Q, room)
-        if keep:
-            transition[k], predicted[k], P_predicted[k] = F, x, P
-        S = P[0, 0] + 1.0
-        for i in range(n):
-            gain[i] = P[i, 0] / S
-        for c in range(channels):
-            e = values[k, c] - x[0, c]
-            for i in range(n):
-                x[i, c] += gain[i] * e
-            if k >= _WARM_UP:
-                quad += e * e / S
-        if k >= _WARM_UP:
-            log_det += np.log(S)
-            count += 1
-        _update(P, gain, room)
-        if keep:
-            filtered[k], P_filtered[k] = x, P
-    return filtered, P_filtered, predicted, P_predicted, transition, quad, log_det, count
-
-
-@njit(cache=True)
-def _predict(x, P, F, Q, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Move state and covariance one step on, in place; F is upper triangular."""
-    n = len(P)
-    for i in range(n):
-        for c in range(x.shape[1]):
-            total = 0.0
-            for m in range(i, n):
-                total += F[i, m] * x[m, c]
-            x[i, c] = total
-        for j in range(n):
-            total = 0.0
-            for m in range(i, n):
-                total += F[i, m] * P[m, j]
-            room[i, j] = total
-    for i in range(n):
-        for j in range(n):
-            total = Q[i, j]
-            for m in range(j, n):
-                total += room[i, m] * F[j, m]
-            P[i, j] = total
-
-
-@njit(cache=True)
-def _update(P, gain, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Take one measurement into the covariance, in place; Joseph's form keeps it positive with a very wide start."""
-    n = len(P)
-    for i in range(n):
-        for j in range(n):
-            room[i, j] = P[i, j] - gain[i] * P[0, j]
-    for i in range(n):
-        for j in range(n):
-            P[i, j] = room[i, j] - room[i, 0] * gain[j] + gain[i] * gain[j]
-
-
-@njit(cache=True)
-def _backward(filtered, P_filtered, predicted, P_predicted, transition):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Rauch-Tung-Striebel pass."""
-    states, cov = filtered.copy(), P_filtered.copy()
-    for k in range(len(filtered) - 2, -1, -1):
-        gain = np.linalg.solve(P_predicted[k + 1], transition[k + 1] @ P_filtered[k]).T.copy()
-        states[k] = filtered[k] + gain @ (states[k + 1] - predicted[k + 1])
-        cov[k] = P_filtered[k] + gain @ (cov[k + 1] - P_predicted[k + 1]) @ gain.T
-    return states, cov
