@@ -100,16 +100,6 @@ def test_the_sign_of_the_wrench_is_that_of_the_object():
     assert np.allclose(one.log.wrench, other.log.wrench)
 
 
-def test_numbers_in_g_are_noticed():
-    made = recording(Swing(0, duration=6.0))
-    streams = [
-        replace(s, channels={"specific_force": s.channels["specific_force"] / 9.80665}) if s.name == "imu.csv" else s
-        for s in made.streams
-    ]
-    aligned = align(replace(made, streams=tuple(streams)))
-    assert codes(aligned) == {"gravity-in-g"}
-
-
 def test_accelerations_and_their_variance_from_poses_alone():
     swing = Swing(3)
     aligned = align(recording(swing, imu=False, position=True))

@@ -24,8 +24,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.inertia.solids import box
 from steelyard.report import Report, Residuals, Truth, render, scene_of_mesh, scene_of_solid, write_report
 from steelyard.report.drawing import drawing, even_ellipsoid
-from steelyard.report.markup import script_json, tag, text
-from steelyard.report.numbers import measured
+from steelyard.report.markup import measured, script_json, tag, text
 from steelyard.report.plots import interval
 from steelyard.report.scene import MOST_TRIANGLES
 from steelyard.shape.cloud import Cloud

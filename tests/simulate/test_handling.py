@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from steelyard.bench.objects.conditions import condition, condition_as_published
 from steelyard.errors import BadValue
 from steelyard.identify.least_squares import LeastSquares
 from steelyard.inertia import solids
-from steelyard.simulate.conditions import condition, condition_as_published
 from steelyard.simulate.handling import (
     NOISE,
     REACH,

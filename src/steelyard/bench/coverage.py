@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, require_one, told
-from steelyard.bench.pool import BATCH, spread
+from steelyard.bench.jobs import BATCH, Progress, require_one, spread, told
 from steelyard.check import Array
 from steelyard.errors import SteelyardError
 from steelyard.identify.noise_aware import NoiseAware

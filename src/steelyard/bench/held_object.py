@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from steelyard import evaluate
-from steelyard.bench.asked import Progress, require_known, require_one, told
+from steelyard.bench.jobs import Progress, chosen_folders, require_known, require_one, spread, told
 from steelyard.bench.objects import bound
 from steelyard.bench.objects.cases import (
     METHODS,
@@ -25,9 +25,7 @@ from steelyard.bench.objects.cases import (
     noisy_rows,
 )
 from steelyard.bench.objects.conditions import condition_means, conditions
-from steelyard.bench.objects.folders import chosen_folders
 from steelyard.bench.objects.summary import SCORES, Row, bound_means, summary, table_iv
-from steelyard.bench.pool import spread
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard import evaluate
-from steelyard.bench.asked import Progress, told
+from steelyard.bench.jobs import Progress, told
 from steelyard.bench.logs import long_log
 from steelyard.bench.logs.methods import Method, choose, own_methods
 from steelyard.bench.logs.peers import peer_methods

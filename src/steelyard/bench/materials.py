@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from steelyard.bench.asked import Progress, require_one, told
+from steelyard.bench.jobs import Progress, chosen_folders, require_one, told
 from steelyard.bench.objects.cases import SAME_DENSITY, Case, densities, load_case, noisy_rows
-from steelyard.bench.objects.folders import chosen_folders
 from steelyard.errors import SteelyardError
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_masses import PartMasses

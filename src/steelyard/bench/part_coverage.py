@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, require_one, told
 from steelyard.bench.coverage import HALF_WIDTH, object_scale, rms_error, widths
+from steelyard.bench.jobs import BATCH, Progress, require_one, spread, told
 from steelyard.bench.objects.cases import Case, load_case, noisy_rows
 from steelyard.bench.objects.part_timing import TIMING, timings
-from steelyard.bench.pool import BATCH, spread
 from steelyard.bench.timing import REPEATS
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, told
+from steelyard.bench.jobs import Progress, told
 from steelyard.bench.middles import middle_of
 from steelyard.evaluate import score
 from steelyard.identify.estimate import Estimate

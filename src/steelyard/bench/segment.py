@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, told
-from steelyard.bench.objects.folders import chosen_folders
+from steelyard.bench.jobs import Progress, chosen_folders, told
 from steelyard.bench.shapes.paper_parts import paper_parts, scores_of
 from steelyard.check import Array, Integers
 from steelyard.datasets.known_object import KnownObject

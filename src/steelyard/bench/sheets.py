@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from steelyard.bench.asked import Progress, told
+from steelyard.bench.jobs import Progress, told
 from steelyard.bench.tables import block
 from steelyard.shape.volume import enclose
 from steelyard.workshop.sheets import KINDS, sheets

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
-from steelyard.bench.asked import Progress, told
+from steelyard.bench.jobs import Progress, told
 from steelyard.bench.shapes import hull_sets
 from steelyard.bench.shapes.plain_clustering import plain_cluster
 from steelyard.bench.timing import REPEATS, thread_ms

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, require_known, require_one, told
+from steelyard.bench.jobs import Progress, require_known, require_one, spread, told
 from steelyard.bench.middles import middle_of
-from steelyard.bench.pool import spread
 from steelyard.bench.teams.errors import grasp_errors, score
 from steelyard.bench.timing import thread_ms
 from steelyard.errors import SteelyardError

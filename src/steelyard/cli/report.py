@@ -19,11 +19,10 @@ if TYPE_CHECKING:
     from steelyard.identify.estimate import Estimate
     from steelyard.io.shapes.parts_files import SavedParts
     from steelyard.parts.parts import Parts
-    from steelyard.report import Report, Residuals, Scene, Truth
+    from steelyard.report import Residuals, Scene, Truth
     from steelyard.shape.cloud import Cloud
     from steelyard.shape.mesh import TriangleMesh
     from steelyard.spatial import Pose
-    from steelyard.team.estimate import TeamEstimate
 
 _SAME_VOLUME = 0.02
 # [m] Centroids of the same parts in the same place agree to rounding; a page does not show less.
@@ -52,8 +51,9 @@ def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None
            tool: Path | None, pose_in_sensor: str | None, truth: Path | None, rivals: tuple[str, ...],
            title: str | None, output: Path, as_json: bool) -> None:  # fmt: skip
     """Write one self-contained page about RESULT (.json): numbers, parts in 3D, residuals, findings."""
-    from steelyard.io import read_result
+    from steelyard.io import read_result, read_team
     from steelyard.report import Report, write_report
+    from steelyard.report.team_page import team_page
     from steelyard.team.estimate import TeamEstimate
 
     require_output(output, "a page", [".html", ".htm"], result, parts, scan, log, tool, truth)
@@ -65,7 +65,9 @@ def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None
             raise BadValue(
                 "A team's result has no parts to draw: leave --parts, --scan, --truth, --tool and --pose-in-sensor out."
             )
-        page = _of_team(title or f"{result.stem}: what the team carries", estimate, log, data, others, said)
+        rows = None if log is None else read_team(log, data)
+        heading = title or f"{result.stem}: what the team carries"
+        page = team_page(heading, estimate, rows, rivals=others, provenance=said)
     else:
         facts = _Facts() if truth is None else _Facts.read(truth, estimate)
         of_log, residuals = (None, None) if log is None else _from_log(log, data, tool, estimate)
@@ -115,22 +117,6 @@ class _Facts:
             if isinstance(mass, float | int):
                 masses[label] = float(mass)
         return cls(Truth(body, masses), names, X_SO)
-
-
-def _of_team(
-    title: str,
-    estimate: TeamEstimate,
-    log: Path | None,
-    data: Path | None,
-    rivals: Mapping[str, Estimate],
-    provenance: Mapping[str, str],
-) -> Report:
-    """Return the page of a team's result, with the residuals of its log."""
-    from steelyard.io import read_team
-    from steelyard.report.team_page import team_page
-
-    rows = None if log is None else read_team(log, data)
-    return team_page(title, estimate, rows, rivals=rivals, provenance=provenance)
 
 
 def _given_pose(pose_in_sensor: str | None) -> Pose | None:

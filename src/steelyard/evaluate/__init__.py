@@ -1,47 +1,10 @@
 """The papers' scores, done right, and as they were published for comparison."""
 
-from steelyard.evaluate.bodies import (
-    Scores,
-    box_edges,
-    com_mm,
-    com_pct,
-    consistent,
-    inertia_pct,
-    inertia_scale,
-    mass_pct,
-    riemannian,
-    score,
-)
-from steelyard.evaluate.published import score_as_published
-from steelyard.evaluate.segments import (
-    SegmentScores,
-    adjusted_rand,
-    contingency,
-    global_consistency,
-    hausdorff_mm,
-    impurity,
-    score_segments,
-    undersegmentation,
-)
-
-__all__ = [
-    "Scores",
-    "SegmentScores",
-    "adjusted_rand",
-    "box_edges",
-    "com_mm",
-    "com_pct",
-    "consistent",
-    "contingency",
-    "global_consistency",
-    "hausdorff_mm",
-    "impurity",
-    "inertia_pct",
-    "inertia_scale",
-    "mass_pct",
-    "riemannian",
-    "score",
-    "score_as_published",
-    "score_segments",
-    "undersegmentation",
-]
+from steelyard.evaluate.bodies import com_pct as com_pct
+from steelyard.evaluate.bodies import inertia_pct as inertia_pct
+from steelyard.evaluate.bodies import inertia_scale as inertia_scale
+from steelyard.evaluate.bodies import riemannian as riemannian
+from steelyard.evaluate.bodies import score as score
+from steelyard.evaluate.bodies import score_as_published as score_as_published
+from steelyard.evaluate.segments import hausdorff_mm as hausdorff_mm
+from steelyard.evaluate.segments import score_segments as score_segments

@@ -29,14 +29,9 @@ TIE = 1e-12
 
 @dataclass(frozen=True)
 class PublishedPartMasses:
-    """Options of HPS.
-
-    parts  the parts, in the frame of the sensor
-    gate   rows are used where both measured accelerations are shorter than this [m/s^2, rad/s^2]
-    """
+    """HPS with its parts, in the frame of the sensor."""
 
     parts: Parts
-    gate: float = GATE
 
     def identify(self, log: MotionLog) -> Estimate:
         """Return the estimate of a log; the sensor is taken to be tared.
@@ -47,7 +42,7 @@ class PublishedPartMasses:
         used = self.rows(log)
         if not used.any():
             raise CannotAnswer(
-                f"No row has both accelerations below {self.gate:g} (m/s^2, rad/s^2), so none looks still. "
+                f"No row has both accelerations below {GATE:g} (m/s^2, rad/s^2), so none looks still. "
                 "Use the noise-aware estimator, which takes every row."
             )
         chosen = log.rows(used)
@@ -58,10 +53,10 @@ class PublishedPartMasses:
         return self._estimate(chosen, A, b, masses)
 
     def rows(self, log: MotionLog) -> Mask:
-        """Return which rows (N,) are used."""
+        """Return which rows (N,) are used: those where both measured accelerations are within the gate."""
         linear = np.linalg.norm(log.acceleration, axis=1)
         angular = np.linalg.norm(log.angular_acceleration, axis=1)
-        return np.asarray((linear < self.gate) & (angular < self.gate))
+        return np.asarray((linear < GATE) & (angular < GATE))
 
     def _estimate(self, log: MotionLog, A: Array, b: Array, masses: Array) -> Estimate:
         covariance = _covariance(A, log, masses > 0)

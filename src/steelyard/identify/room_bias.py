@@ -39,10 +39,6 @@ class RoomBias:
     mean: Array
     covariance: Array
 
-    def put_right(self, log: MotionLog, rotation: Array) -> MotionLog:
-        """Return the log without it; rotation (N, 3, 3) turns S into W."""
-        return without(self.mean, log, rotation)
-
     def errors(self) -> Array:
         """Return what it may be off by (k, 6): one standard deviation along each of its axes that may be off at all."""
         scale = np.repeat([ARM, 1.0], 3)
@@ -64,7 +60,7 @@ def room_bias(log: MotionLog, rotation: Array, gravity: Array, bias: Bias) -> Ro
     weight = np.concatenate([np.zeros(3), OF_ACCELERATION * gravity])
     found = RoomBias(np.zeros(6), np.zeros((6, 6)))
     for _ in range(ROUNDS):
-        left, problem = prepared(found.put_right(log, rotation), bias)
+        left, problem = prepared(without(found.mean, log, rotation), bias)
         solution = NoiseAware(bias=bias).solution(problem)
         found = _drawn(*_told(left, problem.with_room(left, rotation), solution, found.mean, weight))
     return found

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,15 +45,22 @@ def require_bounded(path: Path, size: int, most: int | None = None) -> None:
         )
 
 
+@contextmanager
+def readable(path: Path | str) -> Iterator[None]:
+    """Raise BadFile where the file, or another that is read with it, cannot be read."""
+    try:
+        yield
+    except OSError as error:
+        raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
+
+
 def read_whole(path: Path) -> bytes:
     """Return the content of a file; raises BadFile where it cannot be read, is too large or a device."""
-    try:
+    with readable(path):
         if path.is_char_device():
             raise BadFile(f"{path}: this is a device, which has no end. Give a file.")
         require_bounded(path, path.stat().st_size)
         return path.read_bytes()
-    except OSError as error:
-        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
 
 
 def load_json(path: Path, what: str, hint: str) -> dict[str, Any]:
@@ -97,14 +105,12 @@ def small_text(path: Path, what: str, kind: str, largest: int) -> str:
 
     No more is read than that: a pipe or a device does not tell its size before.
     """
-    try:
+    with readable(path):
         with path.open("rb") as file:
             content = file.read(largest + 1)
         if len(content) > largest:
             size = max(path.stat().st_size, len(content))
             raise BadFile(f"{path}: {what} is a small {kind} text; this file has {size} bytes.")
-    except OSError as error:
-        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
     return content.decode("utf-8-sig")
 
 

@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from steelyard import check
-from steelyard.errors import BadDescription, BadFile, BadValue, NoDescription
-from steelyard.io.contents import load_toml
+from steelyard.errors import BadDescription, BadValue, NoDescription
+from steelyard.io.contents import load_toml, readable
+from steelyard.io.example import columns_text, lines_of, toml_string
 from steelyard.io.recordings import guess
 from steelyard.io.recordings.arm_joints import arm_of, posed, with_joints_in_order
 from steelyard.io.recordings.description import Description, parse_description
-from steelyard.io.recordings.description_text import description_text
+from steelyard.io.recordings.not_told import line
 from steelyard.io.recordings.stream_files import open_table, open_tables, own_rows, read_cells, streams_of
 from steelyard.io.streams.channels import without_missing
 from steelyard.io.streams.entries import StreamSpec
@@ -30,10 +31,8 @@ def read_recording(path: Path | str, data: Path | str | None = None) -> Recordin
     Returns the streams in SI, each on its own clock; all clocks count from one common origin.
     Raises BadFile, BadDescription or BadValue: what was expected, what was found, where, and what to do.
     """
-    try:
+    with readable(path):
         return _read(Path(path), data_folder(data))
-    except OSError as error:
-        raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
 
 
 def describe_file(path: Path | str, data: Path | str | None = None) -> str:
@@ -43,14 +42,36 @@ def describe_file(path: Path | str, data: Path | str | None = None) -> str:
     """
     path = _found(Path(path), data_folder(data))
     try:
-        table = open_table(path)
-        return description_text(guess.describe(table)[0], table)
+        with readable(path):
+            table = open_table(path)
+            return _text(guess.describe(table)[0], table)
     except NoDescription as error:
         if not error.example:
             raise
         return error.example
-    except OSError as error:
-        raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
+
+
+def _text(description: Description, table: Table) -> str:
+    """Return the TOML text of what `guess.describe` found in a table; it reads as the table does without it."""
+    gravity = f"gravity = [0, 0, {description.gravity[2]:.12g}]      # in the world frame W, m/s^2"
+    if description.gravity_std:
+        gravity = "# gravity = [0, 0, -9.81]    # that of your place, in the world frame W, m/s^2"
+    log = f'[log]\n{gravity}\nwrench  = "on-object"        # or "on-sensor": what the object does to the sensor\n'
+    return "\n[[stream]]\n".join([log, *(lines_of(_lines(spec, table)) for spec in description.streams)])
+
+
+def _lines(spec: StreamSpec, table: Table) -> dict[str, str]:
+    rows = {"path": toml_string(table.path.name)}
+    if spec.poses:
+        rows["kind"] = '"poses"'
+    if spec.time is not None:
+        units = spec.time.units
+        unit = columns_text(units) if len(units) > 1 else toml_string(units[0])
+        rows["time"] = line(table, [int(n) for n in spec.time.columns], f"unit = {unit}")
+    for each in spec.quantities:
+        how = f'form = "{each.form}"' if each.form else f"unit = {toml_string(each.unit)}"
+        rows[each.name] = line(table, [int(n) for n in each.columns], how)
+    return rows
 
 
 def _found(path: Path, data: Path | None) -> Path:

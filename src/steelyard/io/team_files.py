@@ -12,7 +12,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue
-from steelyard.io.contents import load_toml
+from steelyard.io.contents import load_toml, readable
 from steelyard.io.recordings.arm_joints import arm_of, pose_channels, posed, with_joints_in_order
 from steelyard.io.recordings.description import default_gravity
 from steelyard.io.recordings.stream_files import open_tables, read_cells, streams_of
@@ -43,7 +43,7 @@ def read_team(path: Path | str, data: Path | str | None = None) -> TeamLog:
     Raises BadFile, BadDescription or BadValue: what was expected, what was found, where, and what to do.
     """
     path, folder = Path(path), data_folder(data)
-    try:
+    with readable(path):
         if not path.exists():
             path = find_file(str(path), Path.cwd(), folder)
         if path.suffix.lower() != ".toml":
@@ -51,8 +51,6 @@ def read_team(path: Path | str, data: Path | str | None = None) -> TeamLog:
                 f"{path}: a team is described by a TOML text; found {path.suffix or 'a file without a suffix'}."
             )
         return _team(parse_team_description(load_toml(path), path.name), path, folder)
-    except OSError as error:
-        raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
 
 
 def _team(said: TeamDescription, path: Path, data: Path | None) -> TeamLog:

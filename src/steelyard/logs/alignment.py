@@ -30,7 +30,7 @@ from steelyard.logs.prepared import AlignOptions, Prepared, prepared
 from steelyard.logs.recording import Recording
 from steelyard.logs.steady import with_steady_stamps
 from steelyard.logs.stillness import pose_numbers, still_rows
-from steelyard.logs.tables import NO_GRAVITY, align_tables
+from steelyard.logs.untimed import NO_GRAVITY, align_tables
 from steelyard.spatial import Rotation
 
 _FIT_ROWS = 6000

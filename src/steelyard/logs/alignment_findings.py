@@ -100,22 +100,18 @@ def swings(rigid: float) -> str:
 
 
 def mount_findings(imu: Imu | None, mounting: Mounting | None) -> tuple[Finding, ...]:
-    """Return `gravity-in-g` and `imu-rotated` where the accelerometer gives reason."""
+    """Return `imu-rotated` where the accelerometer, whose mount was not given, is turned."""
     if imu is None or mounting is None:
         return ()
-    out = []
-    if imu.factor != 1.0:
-        message = f"The numbers of '{imu.name}' only fit gravity when multiplied by {imu.factor:.4g}; they were."
-        out.append(Finding.of("gravity-in-g", message))
     angle = float(mounting.rotation.angle())
     std = float(np.max(mounting.rotation_std))
-    if imu.rotation is None and angle > max(_TURNED, 3 * std):
-        message = (
-            f"The accelerometer of '{imu.name}' is turned by {np.degrees(angle):.1f} ± {np.degrees(std):.1f} "
-            f"degrees against S: {axes_in_words(mounting.rotation)} (corrected here)."
-        )
-        out.append(Finding.of("imu-rotated", message))
-    return tuple(out)
+    if imu.rotation is not None or angle <= max(_TURNED, 3 * std):
+        return ()
+    message = (
+        f"The accelerometer of '{imu.name}' is turned by {np.degrees(angle):.1f} ± {np.degrees(std):.1f} "
+        f"degrees against S: {axes_in_words(mounting.rotation)} (corrected here)."
+    )
+    return (Finding.of("imu-rotated", message),)
 
 
 def tap_findings(taps: Array, start: float, rows: int, total: int) -> tuple[Finding, ...]:

@@ -9,13 +9,13 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.curve import Curve
-from steelyard.logs.recording import STANDARD_GRAVITY, Stream
+from steelyard.logs.recording import Stream
 from steelyard.spatial import Rotation, lever_acceleration
 
 
 @dataclass(frozen=True, eq=False)
 class Imu:
-    """An accelerometer stream, low-passed; `factor` is what its numbers were multiplied with to be m/s^2.
+    """An accelerometer stream, low-passed.
 
     signal     specific force (a - g) in its own axes, on its own clock
     noise_std  [m/s^2] per axis after the low-pass
@@ -27,7 +27,6 @@ class Imu:
     noise_std: float
     rotation: Rotation | None
     position: Array | None
-    factor: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,22 +55,13 @@ class Mounting:
         return np.asarray(turned - lever_acceleration(omega, alpha, self.position))
 
 
-def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
-    """Return the accelerometer of a timed stream; numbers that are plainly in g are turned into m/s^2."""
+def imu(stream: Stream, cutoff_hz: float | None) -> Imu:
+    """Return the accelerometer of a timed stream."""
     values = stream.channels["specific_force"]
-    factor = unit_factor(values, gravity_size)
-    curve = signal(stream.stamps, values * factor, cutoff_hz)
-    noise = float(np.sqrt((noise_std(values * factor) ** 2).mean() * noise_left(cutoff_hz, curve.rate)))
+    curve = signal(stream.stamps, values, cutoff_hz)
+    noise = float(np.sqrt((noise_std(values) ** 2).mean() * noise_left(cutoff_hz, curve.rate)))
     position = None if stream.arm is None else np.asarray(stream.arm, dtype=float)
-    return Imu(stream.name, curve, noise, stream.turn, position, factor)
-
-
-def unit_factor(specific_force: Array, gravity_size: float) -> float:
-    """Return 9.80665 where specific forces (N, 3) are in g, its inverse where g was applied twice, else 1."""
-    size = float(np.median(np.linalg.norm(specific_force, axis=1))) / gravity_size
-    if 0.07 < size < 0.14:
-        return STANDARD_GRAVITY
-    return 1 / STANDARD_GRAVITY if 7 < size < 14 else 1.0
+    return Imu(stream.name, curve, noise, stream.turn, position)
 
 
 def first_mount(specific_force: Array, gravity: Array | None, force: Array) -> Rotation:

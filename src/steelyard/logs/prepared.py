@@ -99,7 +99,7 @@ def prepared(recording: Recording, options: AlignOptions) -> Prepared:
     feeling = next((s for s in streams if "specific_force" in s.channels), None)
     sensor = None
     if feeling is not None and "linear_acceleration" not in moving.channels:
-        sensor = imu(feeling, float(np.linalg.norm(recording.gravity)), cutoff)
+        sensor = imu(feeling, cutoff)
     seen = {*moving.streams, *([sensor.name] if sensor is not None else [])}
     one_clock = cutoff is None or source.delay is not None or "specific_force" in source.channels
     clocks = [s for s in streams if s.name in (seen - {source.name} if one_clock else seen)]

@@ -8,8 +8,7 @@ from steelyard.evidence import PartMass
 from steelyard.findings import counted
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of, even_ellipsoid
-from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import measured
+from steelyard.report.markup import Html, joined, measured, tag
 from steelyard.report.palette import hexadecimal, scale_stops
 from steelyard.report.plots import share_bar, swatch
 from steelyard.report.projection import picture

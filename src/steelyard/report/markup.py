@@ -6,9 +6,11 @@ import html
 import json
 from typing import Any
 
+from steelyard.tables.numbers import fixed, places_of, spread
 from steelyard.tables.printable import printable
 
 _LONGEST = 2000  # characters of one text; what is longer was not written for people
+_THIN, _BOUND = "\u202f", "\u00a0"  # no line breaks at either
 _VOID = {"input", "meta", "br", "line", "rect", "circle", "path", "polygon"}
 # Inside <script> a "<" could end the script, and two line ends are none in JSON.
 _IN_SCRIPT = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
@@ -55,3 +57,13 @@ def joined(*children: object) -> Html:
 def script_json(value: Any) -> Html:
     """Return a value as JSON that nothing inside can break out of its script element."""
     return Html(json.dumps(value, separators=(",", ":"), allow_nan=False).translate(_IN_SCRIPT))
+
+
+def measured(value: float, std: float, unit: str) -> Html:
+    """Return a measured number, value ± std with the unit, which no line break parts."""
+    bar = tag("span", f"{_THIN}±{_THIN}{spread(std)}", class_="pm") if std > 0 else ""
+    bound = f"{_BOUND}{unit}".replace(" ", _BOUND)
+    return tag(
+        "span", tag("span", fixed(value, places_of(value, std)), class_="v"), bar, tag("span", bound, class_="u"),
+        class_="q",
+    )  # fmt: skip

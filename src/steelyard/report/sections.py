@@ -9,8 +9,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.inertia.people import ENTRIES
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
-from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import measured
+from steelyard.report.markup import Html, joined, measured, tag
 from steelyard.report.palette import hexadecimal
 from steelyard.report.plots import interval, interval_signs, residual_plot
 from steelyard.tables.numbers import (

@@ -34,15 +34,15 @@ def team_scene(estimate: TeamEstimate) -> Scene:
     parts = [_tube(loop, _RING * size)]
     if estimate.mass > 0:
         parts += [_tube(np.linspace(place, estimate.com, 3), _SPOKE * size) for place in places]
-    bodies = [Body(PAYLOAD, *_joined(parts), np.zeros((0, 3), np.uint8))]
+    bodies = [_painted(PAYLOAD, *_joined(parts), UNSEEN)]
     for label, pose in enumerate(poses, 1):
         ends = pose.apply(np.array([[0, 0, 0.2], [0, 0, -1.0]]) * _DEEP * size)
-        bodies.append(Body(label, *_tube(ends, _GRIPPER * size), np.zeros((0, 3), np.uint8)))
-    painted = [
-        Body(b.label, b.vertices, b.triangles, np.tile(np.array(rgb, np.uint8), (len(b.vertices), 1)))
-        for b, rgb in zip(bodies, [UNSEEN] + [_ROBOT] * len(poses), strict=True)
-    ]
-    return Scene(tuple(painted), None, Pose.identity(), _view(places, up))
+        bodies.append(_painted(label, *_tube(ends, _GRIPPER * size), _ROBOT))
+    return Scene(tuple(bodies), None, Pose.identity(), _view(places, up))
+
+
+def _painted(label: int, vertices: Array, triangles: Integers, rgb: tuple[int, int, int]) -> Body:
+    return Body(label, vertices, triangles, np.tile(np.array(rgb, np.uint8), (len(vertices), 1)))
 
 
 def _up(places: Array) -> Array:

@@ -6,8 +6,7 @@ import numpy as np
 
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
-from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import measured
+from steelyard.report.markup import Html, joined, measured, tag
 from steelyard.report.palette import hexadecimal
 from steelyard.report.plots import swatch
 from steelyard.report.sections import section, table

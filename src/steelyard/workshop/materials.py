@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from steelyard.errors import BadValue
-
 Colour = tuple[int, int, int]
 
 
@@ -50,16 +48,3 @@ BEECH = Material("beech", 710, 0.08, ((206, 160, 112), (170, 60, 40)))
 GLASS = Material("glass", 2500, 0.01, ((150, 172, 150), (140, 150, 160)))
 BOARD = Material("circuit board", 1850, 0.05, ((30, 110, 60), (30, 70, 120)))
 CELL = Material("button cell", 3500, 0.05, (_BARE, _CHROME))
-
-MATERIALS: tuple[Material, ...] = (
-    CARBON_STEEL, ALLOY_STEEL, STAINLESS_STEEL, BLACK_OXIDE_STEEL, DUCTILE_IRON, BRASS, ZINC, ALUMINIUM, MAGNESIUM,
-    FIBREGLASS, PVC, ABS, NYLON, ACETATE, RUBBER, FOAM_RUBBER, HICKORY, ASH, BEECH, GLASS, BOARD, CELL,
-)  # fmt: skip
-
-
-def material(name: str) -> Material:
-    """Return the material of that name; raises BadValue with the list of names."""
-    for candidate in MATERIALS:
-        if candidate.name == name:
-            return candidate
-    raise BadValue(f"There is no material '{name}'; there are: {', '.join(m.name for m in MATERIALS)}.")

@@ -28,9 +28,9 @@ def held_object_table(result: dict[str, Any]) -> str:
     lines = [_head(result)]
     for noise, halves in result["mean"].items():
         for half in HALVES:
-            if _runs(halves[half]):
+            if any(row["runs"] for row in halves[half].values()):
                 lines += ["", *block(f"{noise}, {half}: mean", _rows(result, noise, half), _COLUMNS)]
-        lines += ["", *block(f"{noise}, all: median", _medians(result, noise), _COLUMNS)]
+        lines += ["", *block(f"{noise}, all: median", result["median"][noise]["all"], _COLUMNS)]
     for method, scores in result.get("rank_correlation", {}).items():
         said = ", ".join(f"{name} {'-' if value is None else format(value, '.2f')}" for name, value in scores.items())
         lines += ["", f"rank correlation with the Riemannian error at low noise, {method}: {said}"]
@@ -49,14 +49,6 @@ def _head(result: dict[str, Any]) -> str:
     if result["parts"] in WITH_TABLE_IV:
         lines.append("Table IV: as printed in the paper, over its own twenty objects.")
     return "\n".join([*lines, *condition_lines(result["condition"])])
-
-
-def _runs(methods: dict[str, dict[str, Any]]) -> int:
-    return sum(row["runs"] for row in methods.values())
-
-
-def _medians(result: dict[str, Any], noise: str) -> dict[str, dict[str, Any]]:
-    return dict(result["median"][noise]["all"])
 
 
 def _rows(result: dict[str, Any], noise: str, half: str) -> dict[str, dict[str, Any]]:

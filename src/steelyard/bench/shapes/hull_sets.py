@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress
+from steelyard.bench.jobs import Progress
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.shape.hull import TOLERANCE, hull_volume, hull_work, qhull

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.pool import spread
+from steelyard.bench.jobs import spread
 from steelyard.check import Array
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case

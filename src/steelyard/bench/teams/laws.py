@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import null_space
 
-from steelyard.bench.pool import spread
+from steelyard.bench.jobs import spread
 from steelyard.bench.teams.events import TWISTS
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.pool import spread
+from steelyard.bench.jobs import spread
 from steelyard.bench.teams.errors import score
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog, TeamRecording

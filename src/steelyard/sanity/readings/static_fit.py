@@ -4,6 +4,8 @@ Beside the mass that is weighed stands the mass that is accelerated. UR, Franka 
 payload that was set in the controller before they report the force. What it takes to accelerate the load is left in, or
 more of it. A clock that runs too fast, or positions in a smaller unit than was said, make accelerations too large, and
 the mass that they show too small.
+
+Throughout, `gravity` (3,) [m/s^2] is in W, and `rotation` (N, 3, 3) turns S into W, as the log is read.
 """
 
 from __future__ import annotations
@@ -85,19 +87,13 @@ def fit(seen: Seen, block: Integers) -> StaticFit:
 
 
 def better_fit(view: Glance, gravity: Array, rotation: Array | None) -> StaticFit:
-    """Return the better of two fits: with the measured acceleration and without.
-
-    gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
-    """
+    """Return the better of two fits: with the measured acceleration and without."""
     views = (view,) if view.acceleration is None else (view, view.still)
     return min((fit(v.seen(gravity, rotation), v.block) for v in views), key=lambda found: found.force_share)
 
 
 def varies(view: Glance, gravity: Array, rotation: Array | None) -> bool:
-    """Tell whether gravity, so read, moves about in S by more than a twentieth of its size.
-
-    gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
-    """
+    """Tell whether gravity, so read, moves about in S by more than a twentieth of its size."""
     pull = view.still.seen(gravity, rotation).pull
     return float(np.sqrt(pull.var(0).sum())) > TURNING * float(np.linalg.norm(gravity))
 
@@ -137,10 +133,7 @@ def leave_out(columns: Array, values: Array, block: Integers) -> tuple[Array, Ar
 
 
 def masses_at_a_glance(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
-    """Return the mass [kg] that the force shows by acceleration, then by weight (2,), jackknife std, the share left.
-
-    gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
-    """
+    """Return the mass [kg] that the force shows by acceleration, then by weight (2,), jackknife std, the share left."""
     columns, force = _two_masses(view, gravity, rotation)
     masses, spread, left = solve(columns, force, view.block)
     return masses[:2], spread[:2], left
@@ -155,10 +148,7 @@ def _two_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, A
 
 
 def apart_clearly(view: Glance, gravity: Array, rotation: Array) -> bool:
-    """Tell whether two masses explain so much of what one leaves of the force that nothing else will have made it.
-
-    gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
-    """
+    """Tell whether two masses explain so much of what one leaves of the force that nothing else will have made it."""
     two, force = _two_masses(view, gravity, rotation)
     one = np.concatenate([two[:, :, :1] + two[:, :, 1:2], two[:, :, 2:]], 2)
     left = []
@@ -187,10 +177,7 @@ def compensated(both: str, other: str) -> Finding:
 
 
 def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) -> tuple[Finding, ...]:
-    """Return `weight-compensated` or `motion-mismatch` where force shows another mass by acceleration than by weight.
-
-    gravity (3,) [m/s^2] in W and rotation (N, 3, 3) as the log is read.
-    """
+    """Return `weight-compensated` or `motion-mismatch` where force shows another mass by acceleration than weight."""
     if view.acceleration is None or rotation is None or not varies(view, gravity, rotation):
         return ()
     masses, spread, left = masses_at_a_glance(view, gravity, rotation)

@@ -17,7 +17,7 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription
 from steelyard.findings import Finding, percent
 from steelyard.logs.conditioning import lowpass
-from steelyard.logs.imu import first_mount, unit_factor
+from steelyard.logs.imu import first_mount
 from steelyard.logs.recording import STANDARD_GRAVITY, Recording, Stream
 from steelyard.sanity.readings.glance import CUTOFF_HZ, angular_velocity, resampled
 from steelyard.spatial import Rotation
@@ -27,6 +27,11 @@ FASTEST, FURTHEST = 10.0, 20.0
 _MOST_PLACES = 2_000_000  # looked at, of positions over time
 # A length of gravity in this range is one g, not metres per second squared.
 ONE_G = (0.9, 1.1)
+# What turns an accelerometer's numbers into m/s^2, where their size lies beside gravity, and what they then were.
+_IN_G = (
+    (STANDARD_GRAVITY, (0.07, 0.14), "its numbers are in g"),
+    (1 / STANDARD_GRAVITY, (7.0, 14.0), "g was applied twice"),
+)
 
 # As given more than the first share of the square of the angular velocity is unlike that of the rotations; as it was
 # meant less than the second. A delay of 0.1 s leaves less.
@@ -99,15 +104,14 @@ def _specific_force(recording: Recording) -> tuple[Recording, tuple[Finding, ...
     if gravity <= 0:
         return recording, ()
     for stream, quantity, values in recording.channels("specific_force"):
-        factor = unit_factor(values, gravity)
-        if factor != 1.0:
-            size = float(np.median(np.linalg.norm(values, axis=1)))
-            message = (
-                f"The accelerometer of '{stream.name}' shows {size:.4g} m/s^2 in the median where gravity is "
-                f"{gravity:.4g}: {'its numbers are in g' if factor > 1 else 'g was applied twice'}; multiplied by "
-                f"{factor:.4g}."
-            )
-            return scaled(recording, stream, quantity, factor), (Finding.of("gravity-in-g", message),)
+        size = float(np.median(np.linalg.norm(values, axis=1)))
+        for factor, (low, high), what in _IN_G:
+            if low < size / gravity < high:
+                message = (
+                    f"The accelerometer of '{stream.name}' shows {size:.4g} m/s^2 in the median where gravity is "
+                    f"{gravity:.4g}: {what}; multiplied by {factor:.4g}."
+                )
+                return scaled(recording, stream, quantity, factor), (Finding.of("gravity-in-g", message),)
     return recording, ()
 
 

@@ -90,7 +90,8 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
         return stream, ()
     frozen = np.zeros(len(stream), bool)
     every = "every channel" if set(stream.channels) <= set(NOISY) else "every noisy channel"
-    for name, rows in ((every, _hung_rows(stream)), ("the pose", _hung_poses(stream))):
+    # Poses, or a counter, may go on beside a driver that hangs, and a wrench beside poses that do.
+    for name, rows in ((every, _hung(stream, NOISY)[0]), ("the pose", _hung_poses(stream))):
         if rows.any() and not frozen.any():
             found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and jumps after"))
             frozen = rows
@@ -140,16 +141,8 @@ def _dead(values: Array) -> Mask:
     return np.asarray((values == values[0]).all(0) & lively.any())
 
 
-def _hung_rows(stream: Stream) -> Mask:
-    """Return rows (N,) in which what carries noise stands still for long and then jumps, as a hung driver does.
-
-    Poses, or a counter, may go on beside it.
-    """
-    return _hung(stream, NOISY)[0]
-
-
 def _hung_poses(stream: Stream) -> Mask:
-    """Return rows (N,) in which noisy poses stand still and then jump, while a wrench beside them may go on.
+    """Return rows (N,) in which noisy poses stand still and then jump.
 
     Poses without noise stand still at every rest, and jump after one where parts of logs were joined: they are noisy
     where each stretch without change ends in a jump.
