@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import steelyard as sy
+from sound_hammer import hammer_answer, hammer_log
 from steelyard.logs.recording import Recording
-from steelyard.simulate import hammer
 
 
 def inverted(recording: Recording, positions: bool) -> Recording:
@@ -27,12 +27,12 @@ def inverted(recording: Recording, positions: bool) -> Recording:
 
 @pytest.fixture(scope="module")
 def made() -> Recording:
-    return hammer.recording(0).recording
+    return hammer_log()
 
 
 @pytest.fixture(scope="module")
-def right(made: Recording) -> sy.Estimate:
-    return sy.identify(made)
+def right() -> sy.Estimate:
+    return hammer_answer()
 
 
 @pytest.mark.parametrize("positions", [True, False])

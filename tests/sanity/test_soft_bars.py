@@ -7,18 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import steelyard as sy
+from sound_hammer import hammer_answer
 from steelyard.identify.estimate import Estimate
 from steelyard.sanity.fitted import yielding
 from steelyard.sanity.fitted.yielding import USUAL, Softness, allow_softness
-from steelyard.simulate import hammer
 
 MOVED = np.array([0.0, 0, 0, 0, 2e-4, 0, 0, 1e-4, 0, 2e-4])
 
 
 @pytest.fixture(scope="module")
 def estimate() -> Estimate:
-    return sy.identify(hammer.recording(0).recording)
+    return hammer_answer()
 
 
 def widened(estimate: Estimate, found: Softness, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:

@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
+from tools_seen import right_volume, seen, volume
 
 from steelyard.shape import scan
-from steelyard.shape.carving import carved
-from steelyard.shape.scan import Scan, fuse
+from steelyard.shape.scan import fuse
 from steelyard.shape.scans import scan_findings
 from steelyard.shape.scans.common_table import levelled
 from steelyard.shape.scans.lens_error import Tables, _corrected, lens_by_table
 from steelyard.shape.scans.scene import scene_of
 from steelyard.shape.views import Intrinsics, Views
-from steelyard.shape.volume import enclose
 from steelyard.simulate.camera import disturbed, wrist_arc
-from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
-from steelyard.workshop.catalogue import build
-from steelyard.workshop.finish import painted
 
 
-@cache
 def views() -> Views:
-    return scan_mesh(painted(build("pliers")), 0, count=36).views
+    return seen().views
 
 
 def seen_with(read: Views, focal: float = 1.0, cy: float = 0.0) -> Views:
@@ -116,15 +110,11 @@ def test_a_handful_of_views_tells_nothing() -> None:
     assert told(seen_with(views().chosen(np.arange(0, 36, 4)), 1.1)) is None
 
 
-def volume(scan: Scan) -> float:
-    return carved(enclose(scan.cloud), scan.space).mesh.volume
-
-
 def test_a_scan_is_read_with_the_lens_that_its_table_asks_for_and_says_so() -> None:
     found = fuse(seen_with(views(), 1.05))
     assert [finding.code for finding in found.findings] == ["views-disagree"]
     assert "read with fx 615, fy 615, cx 320, cy 240 instead of fx 646" in found.findings[0].message
-    assert volume(found) == pytest.approx(volume(fuse(views())), rel=0.03)
+    assert volume(found) == pytest.approx(right_volume(), rel=0.03)
 
 
 def test_only_what_was_found_is_said() -> None:

@@ -7,16 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from tools_seen import HAND_EYE, askew, right
 
-from steelyard.shape.scan import fuse
 from steelyard.shape.scans.placement import moved_m, placement
 from steelyard.simulate.camera import disturbed, wrist_arc
-from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
-from steelyard.workshop.catalogue import build
-from steelyard.workshop.finish import painted
 
-HAND_EYE = Pose(Rotation.exp(np.radians([0.6, -0.8, 0.3])), np.array([0.003, -0.002, 0.003]))
 MIDDLE = np.array([0.01, -0.02, 0.03])
 Given = Callable[[Pose, np.random.Generator], Pose]
 
@@ -97,12 +93,10 @@ def test_few_views_have_bars(views: int) -> None:
 
 
 def test_a_scan_with_an_error_at_the_wrist_lies_where_it_is_in_the_world() -> None:
-    seen = scan_mesh(painted(build("pliers")), 0, count=36)
-    right = fuse(seen.views)
-    found = fuse(seen.views.posed(seen.views.X_WC @ HAND_EYE))
+    found = askew()
     assert found.placement is not None
     assert found.placement.at_wrist is not None
-    nearest = cKDTree(right.cloud.xyz).query(found.cloud.xyz)[1]
-    off = np.linalg.norm((found.cloud.xyz - right.cloud.xyz[nearest]).mean(0))
+    nearest = cKDTree(right().cloud.xyz).query(found.cloud.xyz)[1]
+    off = np.linalg.norm((found.cloud.xyz - right().cloud.xyz[nearest]).mean(0))
     assert off < 4 * np.hypot(found.placement.std_m, 1e-4)
-    assert found.table.normal == pytest.approx(right.table.normal, abs=2e-3)
+    assert found.table.normal == pytest.approx(right().table.normal, abs=2e-3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tools_seen import seen
 from views_apart import apart
 
 from steelyard.shape.scans.common_table import levelled
@@ -12,16 +13,13 @@ from steelyard.shape.scans.pose_errors import PoseErrors
 from steelyard.shape.scans.registration import Seen, agreed
 from steelyard.shape.scans.scene import scene_of
 from steelyard.shape.scans.view_steps import Sights, steps_together
-from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
-from steelyard.workshop.catalogue import build
-from steelyard.workshop.finish import painted
 
 
 @pytest.mark.parametrize("tool", ["box-wrench", "hammer"])
 def test_a_camera_askew_at_the_wrist_no_longer_swells_what_it_sees(tool: str) -> None:
     """All views have the object too near by as much: one by one they went a third of the way in four rounds."""
-    views = scan_mesh(painted(build(tool)), 0, count=36).views
+    views = seen(tool).views
     askew = Pose(Rotation.exp(np.array([0.004, 0.002, 0.0])), np.array([0.0, 0.0, 0.002]))
     scene = scene_of(views.posed(views.X_WC @ askew))
     off = levelled(scene) or 0.0
