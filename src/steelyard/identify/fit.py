@@ -19,6 +19,7 @@ from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem, require_rows, without_drift
 from steelyard.identify.rest import at_rest, without_noise_of_rest
 from steelyard.identify.solution import Solution
+from steelyard.logs.drift import STEADILY
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 
@@ -29,12 +30,14 @@ class Bias:
 
     kind   "free": a constant force and torque are estimated; "none": the sensor is known to be tared
     prior  what another run has shown of it
-    drift  the bias also grows linearly over the log
+    drift  the bias also drifts over the log
+    settling  time constant [s] in which such a drift settles; infinite, it grows in a line
     """
 
     kind: Literal["free", "none"] = "free"
     prior: BiasPrior = NOTHING_KNOWN
     drift: bool = False
+    settling: float = STEADILY
 
     def __post_init__(self) -> None:
         if self.kind not in ("free", "none"):
@@ -121,7 +124,7 @@ def prepared(
     Noise is judged with a drift taken out; `settled` may change such a log before the drift is given back.
     """
     require_rows(len(log))
-    steady = without_drift(log) if bias.drift else log
+    steady = without_drift(log, bias.settling) if bias.drift else log
     lost = log.wrench - steady.wrench
     steady = with_noise(steady, bias.free)
     if settled is not None:
@@ -141,4 +144,4 @@ def _drifting(steady: MotionLog, log: MotionLog, lost: Array) -> MotionLog:
 
 def _problem(log: MotionLog, bias: Bias, by_block: bool) -> Problem:
     problem = problem_of(Moments.of_log(log, by_block), bias)
-    return problem.with_drift(log) if bias.drift else problem
+    return problem.with_drift(log, bias.settling) if bias.drift else problem

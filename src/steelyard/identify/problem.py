@@ -14,6 +14,7 @@ from steelyard.identify.cost.newton import Rows
 from steelyard.identify.cost.noise_cost import information, residual_map_of, weights_at
 from steelyard.identify.noise_levels import DEAF, EVERYDAY
 from steelyard.inertia.regressor import design
+from steelyard.logs.drift import STEADILY, settled_course
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 from steelyard.logs.noise import mean_heard
@@ -98,12 +99,12 @@ class Problem:
             moments.scatter, label, moments.block, still,
         )  # fmt: skip
 
-    def with_drift(self, log: MotionLog) -> Problem:
-        """Return the problem with a bias that also grows linearly in time; `log` is the one the statistic came from.
+    def with_drift(self, log: MotionLog, settling: float = STEADILY) -> Problem:
+        """Return the problem with a bias that also drifts in time; `log` is the one the statistic came from.
 
-        Time is scaled to -1..1 over the log, so that the drift's unit is half the change from start to end.
+        The drift's unit is half the change from start to end; it settles with a time constant [s], or grows in a line.
         """
-        return self._with_columns(log, scaled_time(log)[:, None], -np.eye(6)[:, :, None])
+        return self._with_columns(log, course(log, settling)[:, None], -np.eye(6)[:, :, None])
 
     def with_room(self, log: MotionLog, rotation: Array) -> Problem:
         """Return the problem with a bias (6,) in W as well; rotation (N, 3, 3) turns S into W at the rows of `log`."""
@@ -205,17 +206,16 @@ def require_rows(rows: int) -> None:
         )
 
 
-def without_drift(log: MotionLog) -> MotionLog:
+def without_drift(log: MotionLog, settling: float = STEADILY) -> MotionLog:
     """Return the log less a drift found by weighted least squares: what noise and rest are judged by."""
     loud = replace(log, noise_class=np.zeros(len(log), np.int64), noise=(Noise(np.zeros(6), EVERYDAY),))
-    problem = Problem.of(Moments.of_log(loud, by_block=False), True).with_drift(loud)
+    problem = Problem.of(Moments.of_log(loud, by_block=False), True).with_drift(loud, settling)
     linear = solve_scaled(*problem.normal_equations(np.diag(1 / EVERYDAY)[None]))
-    return replace(log, wrench=log.wrench - np.outer(scaled_time(log), linear[16:]))
+    return replace(log, wrench=log.wrench - np.outer(course(log, settling), linear[16:]))
 
 
-def scaled_time(log: MotionLog) -> Array:
-    """Return time (N,) scaled to -1..1 over the log."""
+def course(log: MotionLog, settling: float = STEADILY) -> Array:
+    """Return how a drift goes from -1 to 1 (N,) over the log: in a line, or settling with a time constant [s]."""
     if log.time is None:
         raise CannotAnswer("A drifting bias needs a clock; the log has none. Record a time column.")
-    start, end = float(log.time.min()), float(log.time.max())
-    return np.asarray((2 * log.time - start - end) / max(end - start, 1e-9))
+    return settled_course(log.time, settling)

@@ -58,7 +58,7 @@ def identify(
         load, estimate = load.followed()
     load, estimate, late = looked_back(load, estimate, rows, recording, before)
     estimate = corrections_allowed(load, estimate, rows)
-    estimate = load.without_tool(estimate).noted(*rows.notes, *[f"{DRIFT_ALLOWED}, as asked"] * options.drift)
+    estimate = load.without_tool(estimate).noted(*rows.notes, *[f"{DRIFT_ALLOWED} in a line, as asked"] * options.drift)
     estimate = estimate if rows.place is None else rows.place.widened(estimate)
     estimate = estimate if rows.maybe is None else rows.maybe.allowed(estimate)
     estimate, of_sensor = of_sensor_and_body(load, estimate, rows, recording, (*before, *late))

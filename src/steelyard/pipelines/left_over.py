@@ -6,7 +6,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.problem import scaled_time
+from steelyard.logs.drift import SETTLING, STEADILY, settled_course
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.options import DRIFT_ALLOWED, Options
@@ -39,7 +39,7 @@ def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = 
     vector = estimate.parameters.vector + (0.0 if tool is None else tool.parameters.vector)
     left = log.wrench - log.predicted(vector) - recording.wrench_sign * estimate.wrench_bias
     if any(note.startswith(DRIFT_ALLOWED) for note in estimate.notes) and log.time is not None:
-        left = left - _line(scaled_time(log), left)
+        left = left - _drift(log.time, left)
     return since_start(log, recording), np.where(log.dead, 0.0, left)
 
 
@@ -54,6 +54,9 @@ def of_another_fit(estimate: Estimate, left: Array) -> bool:
     return bool((typical > OTHER * said + 1e-6).any())
 
 
-def _line(time: Array, left: Array) -> Array:
-    """Return the line (N, 6) in time that fits residuals best: the drift that the fit took out."""
-    return np.outer(time, time @ left / max(float(time @ time), 1e-300))
+def _drift(time: Array, left: Array) -> Array:
+    """Return the drift (N, 6) that fits residuals best: the one that the fit took out."""
+    span, size = float(np.ptp(time)), np.std(left, axis=0) + 1e-300
+    courses = [settled_course(time, settling) for settling in (STEADILY, *(span * share for share in SETTLING))]
+    drifts = [np.outer(course, course @ left / max(float(course @ course), 1e-300)) for course in courses]
+    return min(drifts, key=lambda drift: float((((left - drift) / size) ** 2).sum()))

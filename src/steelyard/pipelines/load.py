@@ -116,9 +116,9 @@ class Load:
         """Return what other rows weigh, with the same known beforehand."""
         return replace(self, log=log).estimate()
 
-    def drifting(self) -> Load:
-        """Return the load with a bias that may grow in time."""
-        return replace(self, bias=replace(self.bias, drift=True))
+    def drifting(self, settling: float) -> Load:
+        """Return the load with a bias that may drift in time, and settles with a time constant [s]."""
+        return replace(self, bias=replace(self.bias, drift=True, settling=settling))
 
     def without_tool(self, estimate: Estimate) -> Estimate:
         """Return the object alone."""

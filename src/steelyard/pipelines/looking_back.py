@@ -42,8 +42,8 @@ def looked_back(
     late = of_rows(load.log, rows.aligned, recording.gravity, drift)
     steady = load.bias.free and not load.bias.drift
     if steady and drift and drift.sure and "base-tilted" not in codes(late):
-        load, estimate = load.drifting().followed()
-        estimate = estimate.noted(f"{DRIFT_ALLOWED}, as the log shows (most surely {drift.surest_words})")
+        load, estimate = load.drifting(drift.settling).followed()
+        estimate = estimate.noted(f"{DRIFT_ALLOWED}, {drift.way}, as the log shows (most surely {drift.surest_words})")
     late = (*late, *of_answer(load.log, estimate, recording))
     if not rows.unmeasured:
         late = (*late, *examine_masses(load.log, (*before, *late)))

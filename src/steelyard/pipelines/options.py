@@ -11,7 +11,7 @@ from steelyard.parts.material import Material
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 # How the note begins that says that the bias may drift.
-DRIFT_ALLOWED = "the bias may drift in a line"
+DRIFT_ALLOWED = "the bias may drift"
 
 
 @dataclass(frozen=True)

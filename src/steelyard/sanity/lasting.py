@@ -23,10 +23,13 @@ def lasting(miss: Array, at: Integers) -> float:
 def clear(plain: Array, fitted: Array, at: Integers, free: float = 1.0) -> float:
     """Return how many times as much a fit explains of what lasts as it leaves, white noise left out of account.
 
+    What it leaves is told from white noise no better than by what chance makes of that: a standard deviation of it.
+
     plain, fitted  residuals (N, k) without what may be the cause, and with it
     at             (N,) the second that each row is in
     free           share of the rows that are independent where noise is white
     """
-    left = lasting(fitted, at)
-    white = float((fitted**2).sum()) * (int(at.max()) + 1) / (free * len(at))
-    return (lasting(plain, at) - left) / max(left - white, _SMALLEST * left, 1e-300)
+    left, seconds = lasting(fitted, at), int(at.max()) + 1
+    white = float((fitted**2).sum()) * seconds / (free * len(at))
+    chance = white * float(np.sqrt(2 / (fitted.shape[1] * seconds)))
+    return (lasting(plain, at) - left) / max(left - white, chance, _SMALLEST * left, 1e-300)

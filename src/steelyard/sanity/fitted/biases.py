@@ -1,4 +1,4 @@
-"""A bias of the wrench that is not constant: one that grows in time, as a sensor that warms up has, or keeps its
+"""A bias of the wrench that is not constant: one that drifts in time, as a sensor that warms up has, or keeps its
 direction in the room; how much, and how surely.
 """
 
@@ -12,6 +12,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.fit import Bias
 from steelyard.identify.room_bias import RoomBias, room_bias, without
+from steelyard.logs.drift import STEADILY
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.fitted.misplaced import misplaced
@@ -42,11 +43,12 @@ REMEDY = (
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """A bias that grows in time: how much over the log [tau N m, f N] (6,), by how much it may be off, what it leaves.
+    """A bias that drifts in time: how much over the log [tau N m, f N] (6,), by how much it may be off, what it leaves.
 
-    left    squared residual beside that of a steady bias
-    weight  [N] of what is held
-    span    [s] of the log
+    left      squared residual beside that of a steady bias
+    weight    [N] of what is held
+    span      [s] of the log
+    settling  time constant [s] in which it settles; infinite, it grows in a line
     """
 
     growth: Array
@@ -54,6 +56,7 @@ class Drift:
     left: float
     weight: float
     span: float
+    settling: float = STEADILY
 
     @property
     def sure(self) -> bool:
@@ -76,9 +79,14 @@ class Drift:
         sizes, errors = self._sizes
         message = (
             f"The bias drifts by {sizes[1]:.2g} ± {errors[1]:.1g} N and {sizes[0]:.2g} ± {errors[0]:.1g} N m over "
-            f"{self.span:.0f} s; a line in time takes {100 * (1 - self.left):.0f} % of the squared residual away."
+            f"{self.span:.0f} s, {self.way}, which takes {100 * (1 - self.left):.0f} % of the squared residual away."
         )
         return (Finding.of("bias-drift", message),)
+
+    @property
+    def way(self) -> str:
+        """How it goes, in words."""
+        return "in a line" if self.settling == STEADILY else f"settling with a time constant of {self.settling:.2g} s"
 
     @property
     def surest_words(self) -> str:
@@ -95,16 +103,17 @@ class Drift:
 
 
 def drift_of(log: MotionLog) -> Drift | None:
-    """Return how the bias grows over the log; None without a clock, or for too short a log."""
+    """Return how the bias drifts over the log; None without a clock, or for too short a log."""
     if log.time is None or len(log) < _FEWEST_ROWS:
         return None
     rows, _ = Rows.of(log)
     if not rows.split:
         return None
-    steady, moving = rows.solve(), rows.solve(rows.drifting(), jackknife=True)
+    settling = rows.settling()
+    steady, moving = rows.solve(), rows.solve(rows.drifting(settling), jackknife=True)
     weight = abs(float(steady.phi[0])) * float(np.linalg.norm(log.gravity, axis=1).mean())
     span = float(log.time[-1] - log.time[0])
-    return Drift(moving.extra, moving.extra_std, moving.beside(steady), weight, span)
+    return Drift(moving.extra, moving.extra_std, moving.beside(steady), weight, span, settling)
 
 
 @dataclass(frozen=True, eq=False)

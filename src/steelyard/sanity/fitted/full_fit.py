@@ -15,6 +15,7 @@ from steelyard.check import Array, Integers
 from steelyard.identify.cost import left_out
 from steelyard.identify.cost.linear import inverse_scaled
 from steelyard.inertia.regressor import design, motion_map
+from steelyard.logs.drift import SETTLING, STEADILY, settled_course
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
 from steelyard.logs.noise import mean_heard, robust_std
@@ -27,6 +28,7 @@ _BLOCKS = 12
 _SMALLEST = 1e-9
 _MEAN_S = 1.0  # of what is slow in a residual
 FEWEST_BLOCKS = 6  # stretches: leaving each out in turn tells a spread from so many of them on
+CURVED = 0.9  # of what lasts beside a drift in a line: one that settles must leave less
 RANK = 1e-9  # of the largest eigenvalue: what is below is not told
 
 # Noise of an acceleration hides what follows it by its share of the variance; so many times that is allowed. Where
@@ -176,13 +178,29 @@ class Rows:
         """Return the derivative (N, 6, 3) of the wrench by a small turn of gravity (3,) in W [rad]."""
         return np.asarray(motion_map(phi)[:, 3:6] @ (np.swapaxes(rotation, 1, 2) @ cross_matrix(gravity)))
 
-    def drifting(self) -> Array:
-        """Return columns (N, 6, 6) of a bias that grows by one over the log."""
+    def drifting(self, settling: float | None = None) -> Array:
+        """Return columns (N, 6, 6) of a bias that drifts by one over the log, and settles as given or as it shows."""
         if self.log.time is None:
             return np.zeros((len(self.values), 6, 6))
-        time = self.log.time
-        run = (time - time.mean()) / max(float(time[-1] - time[0]), _SMALLEST)
-        return np.asarray(run[:, None, None] * np.eye(6))
+        settling = self.settling() if settling is None else settling
+        return np.asarray(settled_course(self.log.time, settling)[:, None, None] * np.eye(6) / 2)
+
+    def settling(self) -> float:
+        """Return the time constant [s] in which a drift settles; infinite where a line leaves hardly more.
+
+        What it leaves is compared in means over a second: white noise hides a drift, and does not last.
+        """
+        if self.log.time is None:
+            return STEADILY
+        span = float(np.ptp(self.log.time))
+        left = {s: self._drifted(s) for s in (STEADILY, *(span * share for share in SETTLING))}
+        best = min(left, key=lambda s: left[s])
+        return best if left[best] < CURVED * left[STEADILY] else STEADILY
+
+    def _drifted(self, settling: float) -> float:
+        """Return what lasts for a second beside a drift that settles so."""
+        columns = self.drifting(settling)
+        return self.slowly(self.solve(columns), columns)
 
 
 # Many rooms ask for the same rows of a log.

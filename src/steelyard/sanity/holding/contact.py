@@ -13,6 +13,7 @@ from steelyard.findings import Finding
 from steelyard.inertia.regressor import design
 from steelyard.logs.autocorrelation import correlation_time
 from steelyard.logs.clock import median_step
+from steelyard.logs.drift import STEADILY, settled_course
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
 from steelyard.logs.recording import ROUNDED_GRAVITY
@@ -48,9 +49,11 @@ MUCH, MOVING = 0.4, 0.8
 # Where it is more than that, it is left out only if the extra force or torque is so many times what the rest leaves:
 # errors that vary with the pose are everywhere, and the times that happen to agree give a worse answer than all.
 STANDS_OUT = 15.0
+# Time constants, as shares of the log, that make up a drift which settles.
+PACES = (1 / 16, 1 / 5)
 ALL_ELSE = (
     "Check what spoils a whole log first: time unit, clocks, axes and signs of the wrench, how the sensor is mounted, "
-    "a payload that the controller compensates, a bias that drifts in a curve (warm the sensor up). If all are right, "
+    "a payload that the controller compensates, a bias that rises and falls. If all are right, "
     "keep hands and fixtures off the object."
 )
 TARED = "If the sensor was tared within the log, cut the log there and identify each piece with its own bias. Else:"
@@ -197,11 +200,15 @@ def _left_out(found: Consensus, touches: Sequence[Touch], kept: Mask) -> bool:
 
 
 def _with_drift(slices: Slices, late: Array) -> Slices:
-    """Return the slices less the late wrench; a bias, where there is none, and its drift are more parameters."""
-    count, _, size = slices.A.shape
-    powers = (0, 1) if size == 10 else (1,)
-    columns = [np.linspace(-1, 1, count)[:, None, None] ** k * np.eye(6) for k in powers]
-    ridge = np.append(slices.ridge, np.full(6 * len(powers), slices.ridge.min()))
+    """Return the slices less the late wrench; a bias, where there is none, and its drift are more parameters.
+
+    A drift goes in a line, or settles at any pace.
+    """
+    span = float(np.ptp(slices.time))
+    courses = [settled_course(slices.time, settling) for settling in (STEADILY, *(span * share for share in PACES))]
+    courses += [np.ones(len(slices.time))] * (slices.A.shape[2] == 10)
+    columns = [course[:, None, None] * np.eye(6) for course in courses]
+    ridge = np.append(slices.ridge, np.full(6 * len(courses), slices.ridge.min()))
     return Slices(np.concatenate([slices.A, *columns], 2), slices.y - late, slices.time, slices.weight, ridge)
 
 
