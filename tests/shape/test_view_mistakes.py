@@ -58,6 +58,8 @@ WRONG: list[tuple[str, Callable[[Views], Views], str]] = [
     ("inverted rotation", lambda v: rotated(v, v.X_WC.rotation.inverse()), "from the camera's axes to those of W"),
     ("opengl", lambda v: turned(v, OPENGL), "not those of OpenGL"),
     ("body", lambda v: turned(v, BODY), "x right, y down, z forward, not those of the body"),
+    ("upside down", lambda v: turned(v, Rotation.exp([0, 0, np.pi])), "images turned by 180 degrees, .*: give poses"),
+    ("on its side", lambda v: turned(v, Rotation.exp([0, 0, np.pi / 2])), "images turned by -90 degrees, .* x right,"),
     ("millimetres", lambda v: moved(v, 1000), "divided by 1000, .*: give them in metres"),
     ("centimetres", lambda v: moved(v, 100), "divided by 100, .*: give them in metres"),
     ("a thousandth", lambda v: moved(v, 0.001), "times 1000, .*: give them in metres"),

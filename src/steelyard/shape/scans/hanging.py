@@ -3,6 +3,9 @@
 Under a part that stands off the table the lowest sight lines leave a wedge. A rod fills it and a blade does not, and no
 view tells which. But a rod hangs below where it was last seen by no more than it rises above that, and what is sheer
 from there to its top is no rod. What was closed farther down is as likely air: the volume's bar holds all of it.
+
+Nor is it seen how a thin rod goes on below its sides, so near to the table: there its underside is left flat. The bar
+holds what it would have if it were as round below as it is above.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ _MUCH = 0.06  # of the volume: rods and hammers leave 0.04
 
 
 def hanging(scene: Scene, bottom: Underside, xyz: Array, normal: Array) -> tuple[tuple[Finding, ...], float]:
-    """Return what is said of space that was closed under overhangs, and what it adds to the volume's std [m^3].
+    """Return what is said of space closed under overhangs, and what it and rods add to the volume's std [m^3].
 
     xyz, normal  (N, 3) the seen surface, in the table's frame
     """
@@ -44,7 +47,17 @@ def hanging(scene: Scene, bottom: Underside, xyz: Array, normal: Array) -> tuple
     empty = scene.seen_empty(np.column_stack([spots, level[column, k]]))
     size = tall[column] * grid.pitch**2 / _LEVELS
     closed, left = float(size[~empty].sum()), float(tall.sum() * grid.pitch**2 - size[empty].sum())
-    return ((_open(closed / left),) if closed > _MUCH * left else ()), closed
+    return ((_open(closed / left),) if closed > _MUCH * left else ()), float(np.hypot(closed, _round_below(bottom)))
+
+
+def _round_below(bottom: Underside) -> float:
+    """Return the volume [m^3] that was left open under what rises from its rim, if it falls below as it rises above."""
+    under = bottom.under
+    nearest = tuple(ndimage.distance_transform_edt(~rim_of(under), return_distances=False, return_indices=True))
+    height, top = np.where(under, bottom.height, 0.0), np.where(under, bottom.top, 0.0)
+    fallen = height[nearest] - np.maximum(top - top[nearest], 0)
+    left = np.where(under & ~bottom.seen, height - np.maximum(fallen, bottom.empty), 0.0)
+    return float(np.maximum(left, 0).sum()) * bottom.grid.pitch**2
 
 
 def _free_to(bottom: Underside, xyz: Array, normal: Array, off_table: float) -> Array:

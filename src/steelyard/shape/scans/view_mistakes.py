@@ -24,6 +24,7 @@ _MOST, _MORE = 0.5, 0.25  # of the points on one plane, and by how much more tha
 _UNITS = (0.001, 0.0001, 0.00025, 0.0002, 0.01)
 # Images of the usual sizes, over the one that the intrinsics belong to.
 _SIZES = (1 / 3, 0.5, 2 / 3, 1.5, 2.0, 3.0)
+_ROLLS = (90, 180, -90)  # of the images against the axes of the poses [degrees]
 _OPENGL = Rotation(np.diag([1.0, -1.0, -1.0]))
 _BODY = Rotation(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))  # the optical axes seen from the body
 
@@ -83,6 +84,12 @@ _POSES: tuple[Mistake, ...] = (
 )  # fmt: skip
 
 
+def _of_roll(degrees: int) -> Mistake:
+    undone = f"the images turned by {degrees} degrees"
+    do = "give poses of axes x right, y down as the images are stored (is the camera mounted turned?)"
+    return undone, do, lambda g: g.turned(Rotation.exp([0.0, 0.0, np.radians(degrees)]))
+
+
 def _of_unit(unit: float) -> Mistake:
     return f'"depth_unit_m": {unit:g}', "correct it in camera.json", lambda g: replace(g, unit=unit)
 
@@ -92,7 +99,7 @@ def _of_size(factor: float) -> Mistake:
     return undone, "give the intrinsics of images of this size in camera.json", lambda g: g.resized(factor)
 
 
-_MISTAKES = (*_POSES, *map(_of_unit, _UNITS), *map(_of_size, _SIZES))
+_MISTAKES = (*_POSES, *map(_of_roll, _ROLLS), *map(_of_unit, _UNITS), *map(_of_size, _SIZES))
 
 
 def _of_scale(scale: float) -> Mistake:
