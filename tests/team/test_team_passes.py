@@ -11,14 +11,24 @@ from steelyard.bench.teams.table import _SCALE
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.logs.curve import Curve
+from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import log_pose
-from steelyard.team.adjoint import adjoint_inverse, exp, moved, turned_by, turns_between, twists_between
+from steelyard.team.adjoint import (
+    adjoint_inverse,
+    exp,
+    moved,
+    turned_by,
+    turning_speed,
+    turns_between,
+    twists_between,
+)
 from steelyard.team.changes.slips import alone, find_slip
 from steelyard.team.definite import definite, inverses, logarithms
 from steelyard.team.poses.noise import _scores
-from steelyard.team.poses.rows import held
+from steelyard.team.poses.rows import first_seen, held
 from steelyard.team.poses.solver import SHOWN, Solver, features, pattern_information, scatter, unit
+from steelyard.team.scores import Scores
 from steelyard.team.stacked import Stretch
 
 
@@ -258,3 +268,36 @@ def test_rotation_helpers_agree_with_cross_matrices() -> None:
     F = features(X.rotation.matrix, X.position, np.zeros((0, 1, 6)), np.ones((1, 1), np.bool_))[0]
     turned = X.rotation.matrix[0, 0].T @ cross_matrix(X.position[0, 0])
     np.testing.assert_allclose(F[10:19].reshape(3, 3), turned, atol=1e-15)
+
+
+def test_the_first_robot_that_is_there_sees_the_payload() -> None:
+    rng = np.random.default_rng(5)
+    poses, G, Z = (Pose(Rotation.exp(rng.normal(size=(*n, 3))), rng.normal(size=(*n, 3))) for n in ((4, 3), (3,), (3,)))
+    valid = np.array([[1, 1, 1], [0, 1, 1], [0, 0, 1], [0, 0, 0]], np.bool_)
+    turns, places = first_seen(
+        poses.rotation.matrix, poses.position, valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position
+    )
+    for t, i in enumerate([0, 1, 2, 0]):
+        X = Z[i] @ poses[t, i] @ G[i].inverse()
+        np.testing.assert_allclose(turns[t], X.rotation.matrix, atol=1e-14)
+        np.testing.assert_allclose(places[t], X.position, atol=1e-14)
+
+
+def test_how_fast_a_grasp_turns_is_open_across_gaps_and_beyond_the_ends() -> None:
+    known = np.concatenate([np.arange(0, 1, 0.01), np.arange(2, 3, 0.01)])
+    track = Track.of(known, rotation=Rotation.exp(known[:, None] * [0.0, 0.3, 0.4]))
+    time = np.array([-0.1, 0.005, 0.5, 0.985, 1.5, 2.5, 2.97])
+    speed = turning_speed(track, time, 0.05)
+    assert np.isnan(speed).tolist() == [True, False, False, True, True, False, True]
+    np.testing.assert_allclose(speed[[1, 2, 5]], 0.5, rtol=1e-12)
+
+
+def test_columns_that_count_by_powers_are_as_many_columns() -> None:
+    rng = np.random.default_rng(6)
+    apart, columns, powers = rng.normal(size=(60, 3, 6)), rng.normal(size=(60, 2, 6)), rng.normal(size=(60, 2))
+    J, W, robot = rng.normal(size=(3, 6, 6)), rng.uniform(1, 2, (3, 6)), np.array([2, 0])
+    found = Scores.of(apart, columns, robot, J, W, 4, powers)
+    every = np.concatenate([columns * powers[:, k, None, None] for k in range(2)], axis=1)
+    expected = Scores.of(apart, every, np.tile(robot, 2), J, W, 4)
+    np.testing.assert_allclose(found.pull, expected.pull, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found.information, expected.information, rtol=1e-9, atol=1e-9)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.logs.middles import median
 
 # A gap of the stamps is a jump's where it is as long to within so much and so near to where delays change [s].
 SAME_S, NEAR_S = 0.05, 1.0
@@ -28,11 +29,11 @@ def seconds(time: ArrayLike) -> Array:
 
 def usual_step(steps: np.ndarray[Any, np.dtype[Any]]) -> float:
     """Return how far rows are apart by steps (N-1,), not all zero: of a coarse clock, many rows share a stamp."""
-    usual = float(np.median(steps))
+    usual = float(median(steps))
     if usual > 0:
         return usual
     ticks = steps[steps > 0]
-    return float(np.median(ticks)) * len(ticks) / len(steps)
+    return float(median(ticks)) * len(ticks) / len(steps)
 
 
 def median_step(time: Array) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask, sealed
 from steelyard.logs.clock import sampling_rate
+from steelyard.logs.middles import median
 from steelyard.logs.runs import around
 
 # Samples farther apart than so many median steps have a gap between them.
@@ -37,13 +38,13 @@ class Curve:
 
         known, values = sealed(known), sealed(values)
         steps = np.diff(known)
-        least = _CLOSE * float(np.median(steps))
+        least = _CLOSE * float(median(steps))
         # Stamps of a clock that is taken for another's may fall.
         if 0 < steps.min() < least:
             apart = _apart(known, least)
             known, values = sealed(known[apart]), sealed(values[apart])
             steps = np.diff(known)
-        gap = steps > BRIDGED * np.median(steps)
+        gap = steps > BRIDGED * median(steps)
         monotone = around(gap) | (len(known) < 4)
         slope = np.empty_like(values) if monotone.all() else _slopes(known, values)
         if monotone.any():

@@ -27,10 +27,10 @@ def around(steps: Mask) -> Mask:
 
 def distinct_rows(mask: Mask) -> tuple[Mask, Integers]:
     """Return the different rows (C, M) of a mask (N, M), in order, and which of them each row (N,) is."""
+    if len(mask) and (mask == mask[0]).all():
+        return mask[:1], np.zeros(len(mask), np.int64)
     changes = np.ones(len(mask), np.bool_)
     changes[1:] = (mask[1:] != mask[:-1]).any(1)
-    if changes.sum() == 1:
-        return mask[:1], np.zeros(len(mask), np.int64)
     # Rows are mostly like the one before: only the first of each run is sorted.
     found, first = np.unique(mask[changes], axis=0, return_inverse=True)
     return found, first.ravel()[np.cumsum(changes) - 1]

@@ -11,7 +11,6 @@ import numpy as np
 
 from steelyard.errors import BadValue
 from steelyard.findings import about
-from steelyard.logs.clock import median_step
 from steelyard.logs.team_track import Track
 
 # Stamps with so many times the step and the span of another robot's are milliseconds, or less, beside seconds.
@@ -39,7 +38,7 @@ def require_one_clock_unit(recording: str, tracks: Mapping[str, Track]) -> None:
 
 
 def _step(track: Track) -> float:
-    return max(median_step(track.time), _LEAST)
+    return max(track.step, _LEAST)
 
 
 def _odd(spans: Mapping[str, float], short: str, long: str) -> str:

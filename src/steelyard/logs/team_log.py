@@ -16,7 +16,6 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
-from steelyard.logs.clock import median_step
 from steelyard.logs.team_clock_units import require_one_clock_unit
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose
@@ -65,8 +64,8 @@ class TeamRecording:
         require_one_clock_unit(self.name, self.tracks)
         for name, track in self.tracks.items():
             if len(track) > 1:
-                check.likely_step(median_step(track.time), f"time of '{name}' in '{self.name}'")
-        if self.kind != "still" and min(float(np.ptp(t.time)) for t in self.tracks.values()) < self.LONG_S:
+                check.likely_step(track.step, f"time of '{name}' in '{self.name}'")
+        if self.kind != "still" and min(float(t.time[-1] - t.time[0]) for t in self.tracks.values()) < self.LONG_S:
             self.require_overlap()
 
     def require_overlap(self) -> None:
@@ -96,7 +95,7 @@ class TeamRecording:
         track = self.tracks.get(name)
         if track is None or track.carrying is None or name in self.away:
             return np.full(len(time), name not in self.away)
-        half = 0.5 * median_step(track.time) if len(track) > 1 else 0.5
+        half = 0.5 * track.step if len(track) > 1 else 0.5
         return track.carrying[np.clip(np.searchsorted(track.time, time - half), 0, len(track) - 1)]
 
     def changed(self, change: Callable[[Track, T], Track], by: Mapping[str, T]) -> TeamRecording:

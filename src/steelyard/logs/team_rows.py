@@ -9,8 +9,8 @@ import numpy as np
 
 from steelyard.check import Array, Mask, frozen
 from steelyard.errors import BadValue
-from steelyard.logs.clock import median_step
 from steelyard.logs.curve import BRIDGED, Curve
+from steelyard.logs.middles import median
 from steelyard.logs.team_log import TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation
@@ -76,11 +76,11 @@ def common_time(recording: TeamRecording, names: Sequence[str]) -> Array:
     tracks = [recording.tracks[name] for name in names if name in recording.tracks]
     first = tracks[0].time
     if len(first) > 1 and recording.synchronised:
-        steps = np.diff(first)
-        if np.abs(steps - np.median(steps)).max() < _EVEN * np.median(steps):
+        steps, usual = np.diff(first), median(np.diff(first))
+        if np.abs(steps - usual).max() < _EVEN * usual:
             return first
     begin, end = recording.span
-    rates = [1 / median_step(t.time) for t in tracks if len(t) > 1]
+    rates = [1 / t.step for t in tracks if len(t) > 1]
     if not rates or end <= begin:
         raise BadValue(f"'{recording.name}' needs at least two samples of every robot in the time that all cover.")
     return begin + np.arange(int((end - begin) * max(rates) * (1 + 1e-9)) + 1) / max(rates)
@@ -104,7 +104,7 @@ def channel_at(track: Track, name: str, time: Array) -> tuple[Array, Mask]:
     known = track.time[good]
     if len(known) < 2:
         return np.zeros((len(time), 3)), np.zeros(len(time), np.bool_)
-    step = median_step(track.time)
+    step = track.step
     return Curve.through(known, values[good]).at(time), good if same else near_samples(known, time, step)
 
 

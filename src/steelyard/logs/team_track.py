@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -19,7 +20,7 @@ from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
 from steelyard.findings import counted
-from steelyard.logs.clock import seconds
+from steelyard.logs.clock import median_step, seconds
 from steelyard.spatial import Pose, Rotation
 
 CHANNELS: Mapping[str, str] = MappingProxyType(
@@ -100,6 +101,11 @@ class Track:
     def __len__(self) -> int:
         return len(self.time)
 
+    @cached_property
+    def step(self) -> float:
+        """The usual step [s] of two stamps or more."""
+        return median_step(self.time)
+
     def stamped_at(self, time: Array) -> bool:
         """Return whether `time` (M,) are the track's own stamps, to a microsecond."""
         return len(time) == len(self) and bool(np.abs(time - self.time).max() < 1e-6)
@@ -150,6 +156,7 @@ class Track:
         # The channels were judged when the track was made.
         moved = copy(self)
         object.__setattr__(moved, "time", check.finite("time", time))
+        moved.__dict__.pop("step", None)
         return moved
 
     def without(self, *names: str) -> Track:

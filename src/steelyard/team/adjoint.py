@@ -9,7 +9,8 @@ import numba
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
+from steelyard.logs.middles import mean
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation, cross_matrix
 
@@ -82,8 +83,8 @@ def twists_between(first: Pose, second: Pose) -> Array:
 
 def extent(path: Pose) -> Array:
     """Return how far poses (T,) turn and lie from their middle (2,), rms along an axis [rad, m]."""
-    turns = turns_between(Rotation.nearest(path.rotation.matrix.mean(0)), path.rotation)
-    places = path.position - path.position.mean(0)
+    turns = turns_between(Rotation.nearest(mean(path.rotation.matrix)), path.rotation)
+    places = path.position - mean(path.position)
     return np.sqrt([(turns**2).mean(), (places**2).mean()])
 
 
@@ -97,17 +98,34 @@ def turning_speed(track: Track, time: Array, over_s: float) -> Array:
     if good.sum() < 2:
         return np.full(len(time), np.nan)
     known, values = (track.time, track.channels[name]) if good.all() else (track.time[good], track.channels[name][good])
-    first, last = np.searchsorted(known, time), np.searchsorted(known, time + over_s)
-    inside = (time >= known[0]) & (last < len(known)) & (last > first)
-    first, last = np.minimum(first, len(known) - 1), np.minimum(last, len(known) - 1)
-    seconds = known[last] - known[first]
-    if name == "rotation":
-        turns = turns_between(Rotation.trusted(values[first]), Rotation.trusted(values[last]))
-        speed = np.linalg.norm(turns, axis=1) / np.where(inside, seconds, 1.0)
-    else:
-        speed = np.linalg.norm(values[first], axis=1)
-    # Across a gap the turn may have gone forth and back.
-    return np.where(inside & (seconds < 2 * over_s), speed, np.nan)
+    first, last = _spans(known, time, over_s)
+    speed = _speeds(known, values, first, last) if name == "rotation" else np.linalg.norm(values[first], axis=1)
+    return np.where(last > 0, speed, np.nan)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _spans(known: Array, time: Array, over_s: float) -> tuple[Integers, Integers]:
+    """Return the samples from each rising `time` (T,) to `over_s` later, first and last; zeros where none are apart."""
+    first, last, a, b = np.zeros(len(time), np.int64), np.zeros(len(time), np.int64), 0, 0
+    for t in range(len(time)):
+        while a < len(known) and known[a] < time[t]:
+            a += 1
+        while b < len(known) and known[b] < time[t] + over_s:
+            b += 1
+        # Across a gap the turn may have gone forth and back.
+        if time[t] >= known[0] and a < b < len(known) and known[b] - known[a] < 2 * over_s:
+            first[t], last[t] = a, b
+    return first, last
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _speeds(known: Array, R: Array, first: Integers, last: Integers) -> Array:
+    """Return how fast (T,) [rad/s] rotations R (K, 3, 3) turn between samples, NaN where these are one."""
+    out, E, v = np.empty(len(first)), np.empty((3, 3)), np.empty(3)
+    for t in range(len(first)):
+        _turn(R, first[t], R, last[t], E, v)
+        out[t] = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / (known[last[t]] - known[first[t]])
+    return out
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -115,30 +133,36 @@ def _turns(A: Array, B: Array) -> Array:
     """Return the logarithms (T, 3) of A^T B; A (T, 3, 3) or (1, 3, 3)."""
     out, E, v = np.empty((len(B), 3)), np.empty((3, 3)), np.empty(3)
     for t in range(len(B)):
-        s = t if len(A) > 1 else 0
-        for i in range(3):
-            for j in range(3):
-                E[i, j] = A[s, 0, i] * B[t, 0, j] + A[s, 1, i] * B[t, 1, j] + A[s, 2, i] * B[t, 2, j]
-        # The quaternion, four times its largest entry: no entry is then a difference of like numbers.
-        trace = E[0, 0] + E[1, 1] + E[2, 2]
-        big = 0
-        for i in range(1, 3):
-            if E[i, i] > E[big, big]:
-                big = i
-        if trace >= E[big, big]:
-            w, v[0], v[1], v[2] = 1 + trace, E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]
-        else:
-            i, j = (big + 1) % 3, (big + 2) % 3
-            w = E[j, i] - E[i, j]
-            v[big], v[i], v[j] = 1 + E[big, big] - E[i, i] - E[j, j], E[big, i] + E[i, big], E[big, j] + E[j, big]
-        size = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-        way = -1.0 if w < 0 else 1.0
-        share = 2 * way / np.sqrt(w * w + size * size)
-        if size > 1e-9 * abs(w):
-            share = 2 * way * np.arctan2(size, way * w) / size
-        for i in range(3):
-            out[t, i] = share * v[i]
+        _turn(A, t if len(A) > 1 else 0, B, t, E, v)
+        out[t, 0], out[t, 1], out[t, 2] = v[0], v[1], v[2]
     return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _turn(A: Array, s: int, B: Array, t: int, E: Array, v: Array) -> None:
+    """Write the logarithm v (3,) of E = A[s]^T B[t] (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            E[i, j] = A[s, 0, i] * B[t, 0, j] + A[s, 1, i] * B[t, 1, j] + A[s, 2, i] * B[t, 2, j]
+    # The quaternion, four times its largest entry: no entry is then a difference of like numbers.
+    trace = E[0, 0] + E[1, 1] + E[2, 2]
+    big = 0
+    for i in range(1, 3):
+        if E[i, i] > E[big, big]:
+            big = i
+    if trace >= E[big, big]:
+        w, v[0], v[1], v[2] = 1 + trace, E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]
+    else:
+        i, j = (big + 1) % 3, (big + 2) % 3
+        w = E[j, i] - E[i, j]
+        v[big], v[i], v[j] = 1 + E[big, big] - E[i, i] - E[j, j], E[big, i] + E[i, big], E[big, j] + E[j, big]
+    size = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    way = -1.0 if w < 0 else 1.0
+    share = 2 * way / np.sqrt(w * w + size * size)
+    if size > 1e-9 * abs(w):
+        share = 2 * way * np.arctan2(size, way * w) / size
+    for i in range(3):
+        v[i] *= share
 
 
 @numba.njit(cache=True, error_model="numpy")

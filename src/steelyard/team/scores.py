@@ -28,20 +28,25 @@ class Scores:
     information: Array
 
     @classmethod
-    def of(cls, apart: Array, columns: Array, robot: Integers, J: Array, W: Array, stretches: int) -> Scores:
+    def of(
+        cls, apart: Array, columns: Array, robot: Integers, J: Array, W: Array, stretches: int,
+        powers: Array | None = None,
+    ) -> Scores:  # fmt: skip
         """Return the sums over rows.
 
         apart  (T, N, 6) residuals of each grasp in its own axes     columns  (T, C, 6) and whose they are, robot (C,)
         J      (N, 6, 6) residuals per motion of the payload         W        (N, 6) their weights
+        powers (T, P) by which columns also count, all by the first, then by the next: there are P C parameters
         """
         # The sum over robots of J^T W J is what a row tells of the motion: L L^T is its inverse.
         root = np.linalg.cholesky(np.linalg.inv(np.einsum("nka,nk,nkb->ab", J, W, J)))
         rows, pairs = len(apart), np.argwhere(robot[:, None] == robot)
+        powers = np.ones((rows, 1)) if powers is None else powers
         sizes = np.full(stretches, rows // stretches) + (np.arange(stretches) < rows % stretches)
         first = np.concatenate([[0], np.cumsum(sizes)])
-        pull, information, taken = _gathered(apart, columns, robot, pairs, J @ root, W, first)
+        pull, information, taken = _gathered(apart, columns, powers, robot, pairs, J @ root, W, first)
         for k in range(stretches):
-            shared = taken[:, first[k] : first[k + 1]].reshape(len(robot), -1)
+            shared = taken[:, first[k] : first[k + 1]].reshape(len(taken), -1)
             information[k] -= shared @ shared.T
         return cls(pull, information)
 
@@ -62,30 +67,39 @@ class Scores:
 
 @numba.njit(cache=True, error_model="numpy")
 def _gathered(
-    apart: Array, columns: Array, robot: Integers, pairs: Integers, lever: Array, W: Array, first: Integers
-) -> tuple[Array, Array, Array]:
-    """Return scores (B, C), their information (B, C, C) were the motion known, and what it takes up (C, T, 6).
+    apart: Array, columns: Array, powers: Array, robot: Integers, pairs: Integers, lever: Array, W: Array,
+    first: Integers,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Return scores (B, P C), information (B, P C, P C) were the motion known, and what it takes up (P C, T, 6).
 
-    pairs (P, 2) of columns of one robot    lever (N, 6, 6) of the motion in units of what a row tells of it
+    pairs (K, 2) of columns of one robot    lever (N, 6, 6) of the motion in units of what a row tells of it
     first (B + 1,) rows of the stretches
     """
     T, C = columns.shape[:2]
-    pull, information = np.zeros((len(first) - 1, C)), np.zeros((len(first) - 1, C, C))
-    taken, pushed = np.empty((C, T, 6)), np.empty((C, 6))
-    for k in range(len(first) - 1):
+    P, B = powers.shape[1], len(first) - 1
+    pull, information = np.zeros((B, P * C)), np.zeros((B, P * C, P * C))
+    taken, pushed, moved = np.empty((P * C, T, 6)), np.empty((C, 6)), np.empty(6)
+    for k in range(B):
         for t in range(first[k], first[k + 1]):
             for c in range(C):
-                i = robot[c]
+                i, score = robot[c], 0.0
+                moved[:] = 0.0
                 for a in range(6):
-                    pushed[c, a] = columns[t, c, a] * W[i, a]
-                    pull[k, c] += pushed[c, a] * apart[t, i, a]
-                for m in range(6):
-                    total = 0.0
-                    for a in range(6):
-                        total += pushed[c, a] * lever[i, a, m]
-                    taken[c, t, m] = total
+                    push = columns[t, c, a] * W[i, a]
+                    score += push * apart[t, i, a]
+                    for m in range(6):
+                        moved[m] += push * lever[i, a, m]
+                    pushed[c, a] = push
+                for q in range(P):
+                    pull[k, q * C + c] += powers[t, q] * score
+                    for m in range(6):
+                        taken[q * C + c, t, m] = powers[t, q] * moved[m]
             for p in range(len(pairs)):
                 c, d = pairs[p]
+                total = 0.0
                 for a in range(6):
-                    information[k, c, d] += pushed[c, a] * columns[t, d, a]
+                    total += pushed[c, a] * columns[t, d, a]
+                for q in range(P):
+                    for r in range(P):
+                        information[k, q * C + c, r * C + d] += powers[t, q] * powers[t, r] * total
     return pull, information, taken

@@ -10,7 +10,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from steelyard.check import Array, Mask
-from steelyard.logs.clock import median_step
 from steelyard.logs.curve import Curve
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import channel_at, common_time, mean_rotation, near_samples, within
@@ -23,7 +22,7 @@ from steelyard.team.clocks.errors import PUNCTUAL, ClockError, Errors, punctual
 # through 1 Hz is off by 3e-5 of it over as long, through 3 Hz by 0.2 %.
 BRIDGED, BRIEF = 3, 0.05
 # Of tracks that were read between their stamps: clocks are put right several times, and the curve stays.
-_CURVES: WeakKeyDictionary[Track, tuple[Rotation, Curve]] = WeakKeyDictionary()
+_CURVES: WeakKeyDictionary[Track, tuple[Rotation, Curve] | None] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,60 +80,67 @@ def _stretch(log: TeamLog, given: TeamRecording, errors: Errors) -> Stretch:
     recording = punctual(given, errors)
     time = common_time(recording, log.names)
     rows, count = len(time), len(log.names)
-    turns, place = [Rotation.identity(rows, 1)] * count, np.zeros((rows, count, 3))
-    wrench = np.zeros((rows, count, 6))
-    seen, felt = np.zeros((rows, count), np.bool_), np.zeros((rows, count), np.bool_)
+    # Robot after robot while they are read: rows of many lie far apart.
+    turns, place = np.empty((count, rows, 3, 3)), np.zeros((count, rows, 3))
+    turns[:], wrench = np.eye(3), np.zeros((count, rows, 6))
+    seen, felt = np.zeros((count, rows), np.bool_), np.zeros((count, rows), np.bool_)
     carries = np.stack([recording.carries(name, time) for name in log.names], axis=1)
     for i, name in enumerate(log.names):
         track = recording.tracks.get(name)
         if track is None:
             continue
-        if _between(track, time):
-            turns[i], place[:, i], wrench[:, i], near = _together(
-                given.tracks[name], errors.get(name, PUNCTUAL).own(time)
-            )
-            seen[:, i] = felt[:, i] = bridged(near, time)
+        found = None if track.stamped_at(time) else _curve(given.tracks[name])
+        if found is not None:
+            own = errors.get(name, PUNCTUAL).own(time)
+            turns[i], place[i], wrench[i], near = _together(given.tracks[name], *found, own)
+            seen[i] = felt[i] = bridged(near, time)
             continue
         if track.has("rotation", "position"):
             turned, had = rotation_at(track, time)
-            turns[i] = turned[:, None]
-            place[:, i], placed = _place_at(track, time)
-            seen[:, i] = bridged(had & placed, time)
+            turns[i] = turned.matrix
+            place[i], placed = _place_at(track, time)
+            seen[i] = bridged(had & placed, time)
         if track.has("force"):
-            wrench[:, i, 3:], felt[:, i] = channel_at(track, "force", time)
-            felt[:, i] = bridged(felt[:, i], time)
+            wrench[i, :, 3:], measured = channel_at(track, "force", time)
+            felt[i] = bridged(measured, time)
             if track.has("torque"):
-                wrench[:, i, :3] = channel_at(track, "torque", time)[0]
-    return Stretch(
-        recording.name, recording.kind, time, Pose(Rotation.joined(turns, 1), place), seen, wrench, felt, carries
-    )
+                wrench[i, :, :3] = channel_at(track, "torque", time)[0]
+    poses = Pose.trusted(Rotation.trusted(turns.swapaxes(0, 1)), place.swapaxes(0, 1))
+    pushes = np.ascontiguousarray(wrench.swapaxes(0, 1))
+    saw, sensed = np.ascontiguousarray(seen.T), np.ascontiguousarray(felt.T)
+    return Stretch(recording.name, recording.kind, time, poses, saw, pushes, sensed, carries)
 
 
-def _between(track: Track, time: Array) -> bool:
-    """Return whether poses and forces were measured at every stamp, and `time` (M,) is not the stamps."""
-    whole = all(name in track.channels and bool(track.valid[name].all()) for name in ("rotation", "position", "force"))
-    whole = whole and len(track) > 1 and bool(track.valid.get("torque", track.valid["force"]).all())
-    return whole and not track.stamped_at(time)
+def _together(track: Track, turn: Rotation, curve: Curve, time: Array) -> tuple[Array, Array, Array, Mask]:
+    """Return rotations (M, 3, 3), positions (M, 3) and wrenches (M, 6) at `time` (M,), and where near.
 
-
-def _together(track: Track, time: Array) -> tuple[Rotation, Array, Array, Mask]:
-    """Return rotations (M, 1), positions (M, 3) and wrenches (M, 6) at `time` (M,) from one curve, and where near."""
-    turn, curve = _curve(track)
+    turn, curve  as from `_curve`
+    """
     values = curve.at(time)
-    near = within(track.time, time) if curve.whole else near_samples(track.time, time, median_step(track.time))
-    return turned_by(turn, values[:, :3]), turn.apply(values[:, 3:6]), values[:, 6:], near
+    near = within(track.time, time) if curve.whole else near_samples(track.time, time, track.step)
+    return turned_by(turn, values[:, :3]).matrix[:, 0], turn.turned(values[:, 3:6]), values[:, 6:], near
 
 
-def _curve(track: Track) -> tuple[Rotation, Curve]:
+def _curve(track: Track) -> tuple[Rotation, Curve] | None:
     """Return a track's mean rotation, and rotation vectors from there, positions in its axes and wrenches (T, 12).
 
-    The curve is that of `rotation_at`, `_place_at` and `channel_at` for each.
+    The curve is that of `rotation_at`, `_place_at` and `channel_at` for each; None where not all of these were measured
+    at every stamp.
     """
     if track not in _CURVES:
-        turn, pose = mean_rotation(track), track.pose
-        own = turns_between(turn, pose.rotation), turn.inverse().apply(pose.position)
-        _CURVES[track] = turn, Curve.through(track.time, np.concatenate([*own, track.wrench()], axis=1))
+        _CURVES[track] = _curve_through(track) if _whole(track) else None
     return _CURVES[track]
+
+
+def _whole(track: Track) -> bool:
+    whole = all(name in track.channels and bool(track.valid[name].all()) for name in ("rotation", "position", "force"))
+    return whole and len(track) > 1 and bool(track.valid.get("torque", track.valid["force"]).all())
+
+
+def _curve_through(track: Track) -> tuple[Rotation, Curve]:
+    turn, pose = mean_rotation(track), track.pose
+    own = turns_between(turn, pose.rotation), turn.inverse().apply(pose.position)
+    return turn, Curve.through(track.time, np.concatenate([*own, track.wrench()], axis=1))
 
 
 def rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:

@@ -23,6 +23,7 @@ from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.inertia.regressor import motion_map
+from steelyard.logs.middles import median, quantile
 from steelyard.spatial import unit_vectors
 from steelyard.team.payload.body_rows import BodyRows, PayloadRows, Run, averaged
 from steelyard.team.payload.fit import Fitted, PayloadFit, Weighing, fit_payload
@@ -80,7 +81,7 @@ def _little_borne(body: BodyRows, D: Array) -> tuple[Mask, ...] | None:
     if body.still or not body.runs:
         return None
     borne = [averaged(_borne(run, D), MEAN_S, run.rate) for run in body.runs]
-    least = LITTLE * float(np.quantile(np.concatenate(borne), USUAL))
+    least = LITTLE * float(quantile(np.concatenate(borne), USUAL))
     little = tuple(_around(each < least, run.rate) for each, run in zip(borne, body.runs, strict=True))
     some = least > 0 and any(each.any() for each in little) and not all(each.all() for each in little)
     return little if some else None
@@ -126,16 +127,16 @@ def _without_touched(
     """Return recordings without rows in which the payload was touched, and for how long and how hard that was."""
     phi = fit.payload.parameters
     pushes = [[] if body.still else [_unneeded(run, phi, fit.given, size) for run in body.runs] for body, _ in rows]
-    sizes = [np.linalg.norm(np.concatenate(each), axis=1) if each else np.zeros(0) for each in pushes]
-    usual = [float(np.median(each)) if len(each) else np.inf for each in sizes]
+    sizes = [[np.sqrt(np.einsum("ti,ti->t", push, push)) for push in each] for each in pushes]
+    usual = [float(median(np.concatenate(each))) if each else np.inf for each in sizes]
     out, found = list(rows), list[Finding]()
     for k, (body, left) in enumerate(rows):
         if not pushes[k]:
             continue
         others = min(usual[:k] + usual[k + 1 :], default=np.inf)
         least = max(TIMES * min(usual[k], UNLIKE * others), SHARE * weight(phi))
-        each = zip(pushes[k], body.runs, strict=True)
-        touched = [_around(_inner(np.linalg.norm(push, axis=1) > least, run.rate), run.rate) for push, run in each]
+        each = zip(sizes[k], body.runs, strict=True)
+        touched = [_around(_inner(size > least, run.rate), run.rate) for size, run in each]
         share = float(np.concatenate(touched).mean())
         if not share or (share > MOST and not np.isfinite(others)):
             continue
@@ -155,7 +156,7 @@ def _unneeded(run: Run, phi: Array, D: Array, size: float) -> Array:
     """Return what is pushed (T, 6) and not needed, averaged over MEAN_S and less a constant [N, moments over size]."""
     left = (run.pushed @ D.T - run.motion @ motion_map(phi).T) / np.repeat([size, 1.0], 3)
     smooth = averaged(left, MEAN_S, run.rate)
-    return np.asarray(smooth - np.median(smooth, axis=0))
+    return np.asarray(smooth - median(smooth.T))
 
 
 def _inner(rows: Mask, rate: float) -> Mask:

@@ -47,10 +47,10 @@ def without_changes(
     fitted  makes the fit of recordings after an edit
     other   which slips of two robots, the clearest first, are taken for those of the robot that does not show them best
     """
-    bare, light = idle(raw, SHARE), idle(raw, LIGHT)
+    bare = idle(raw, SHARE)
     given = None if any(rows.any() for rows in bare) else fitted(_unchanged)
     # One who goes ways of its own makes a rough fit; else who pushes with little merely does.
-    asked = None if given is not None and not given.rough else _asked(raw, light, fitted)
+    asked = None if given is not None and not given.rough else _asked(raw, idle(raw, LIGHT), fitted)
     if asked is None:
         given = fitted(_unchanged) if given is None else given
         return _without_slips(log, clocks, given, fitted, _unchanged, other)

@@ -18,7 +18,7 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
-from steelyard.inertia.regressor import motion_map
+from steelyard.inertia.regressor import basis
 from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.changes.contact import MARGIN_S, mean_left
 from steelyard.team.payload.body_rows import BodyRows, PayloadRows, Run
@@ -113,7 +113,7 @@ def _blocks(run: Run, D: Array, size: float) -> tuple[Array, Array, Array]:
     count = len(run.motion) // length
     motion, pushed = (x[: count * length].reshape(count, length, -1).mean(1) for x in (run.motion, run.pushed))
     unit = np.repeat([size, 1.0], 3)
-    needed = np.stack([motion @ motion_map(one).T for one in np.eye(10)], axis=2) / unit[:, None]
+    needed = np.tensordot(motion, basis(), (1, 2)).swapaxes(1, 2) / unit[:, None]
     return (run.rows.start + length * (np.arange(count) + 0.5)) / run.rate, pushed @ D.T / unit, needed
 
 
@@ -122,16 +122,12 @@ def _steps(pushed: Array, always: Array, steps: Array) -> tuple[Array, Array, Ar
 
     pushed  (B, 6)     always  (B, 6, P) what is fitted beside     steps  (B, 6, S)
     """
-    inverse = np.linalg.pinv(np.einsum("bip,biq->pq", always, always), hermitian=True)
-    rest = pushed - always @ (inverse @ np.einsum("bip,bi->p", always, pushed))
-    after = [
-        np.cumsum(x[::-1], axis=0)[::-1]
-        for x in (
-            np.einsum("bip,bis->bps", always, steps), np.einsum("bir,bis->brs", steps, steps),
-            np.einsum("bis,bi->bs", steps, rest),
-        )
-    ]  # fmt: skip
-    H = after[1] - np.einsum("bps,pq,bqr->bsr", after[0], inverse, after[0])
+    flat, beside = always.reshape(-1, always.shape[2]), steps.swapaxes(1, 2)
+    inverse = np.linalg.pinv(flat.T @ flat, hermitian=True)
+    rest = pushed - always @ (inverse @ (flat.T @ pushed.ravel()))
+    each = beside @ always, beside @ steps, (beside @ rest[..., None])[..., 0]
+    after = [np.cumsum(x[::-1], axis=0)[::-1] for x in each]
+    H = after[1] - after[0] @ inverse @ after[0].swapaxes(1, 2)
     sizes = np.einsum("bsr,br->bs", np.linalg.pinv(H, rcond=1e-9, hermitian=True), after[2])
     whole = float((rest**2).sum())
     return whole - np.einsum("bs,bs->b", sizes, after[2]), H, sizes, whole

@@ -14,7 +14,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
-from steelyard.logs.clock import median_step
+from steelyard.logs.middles import quantile
 from steelyard.logs.runs import lasting, runs
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
@@ -41,7 +41,7 @@ def idle(parts: Sequence[Stretch], share: float) -> list[Mask]:
     usual = np.zeros(count)
     for i in range(count):
         felt = np.concatenate([size[part.felt[:, i], i] for size, part in zip(sizes, parts, strict=True)])
-        usual[i] = np.quantile(felt, USUAL) if len(felt) else 0.0
+        usual[i] = quantile(felt, USUAL) if len(felt) else 0.0
     out = []
     for size, part in zip(sizes, parts, strict=True):
         small = (size < share * usual) & part.felt & part.carries
@@ -55,20 +55,20 @@ def _push(force: Array, rate: float) -> Array:
     return np.asarray(np.sqrt(mean[..., 0] ** 2 + mean[..., 1] ** 2 + mean[..., 2] ** 2))
 
 
-def usual_pushes(log: TeamLog) -> dict[str, float]:
-    """Return the push [N] that every robot with forces passes in a tenth of its rows, before any clock is known."""
-    sizes = {name: [_felt(track) for _, track in log.tracks_of(name)] for name in log.names}
-    felt = {name: np.concatenate(own) if own else np.zeros(0) for name, own in sizes.items()}
-    return {name: float(np.nanquantile(own, USUAL)) for name, own in felt.items() if np.isfinite(own).any()}
+def usual_push(log: TeamLog, name: str) -> float:
+    """Return the push [N] that a robot passes in a tenth of its rows, before clocks are known; zero without forces."""
+    felt = np.concatenate([np.zeros(0), *(_felt(track) for _, track in log.tracks_of(name))])
+    felt = felt[np.isfinite(felt)]
+    return float(quantile(felt, USUAL)) if len(felt) else 0.0
 
 
 def perhaps_idle(track: Track, share: float, usual: float) -> Mask:
     """Return the rows (T,) in which a robot may hold nothing: it says so, or pushes with less than a share for IDLE_S.
 
-    usual  its push [N], as of `usual_pushes`
+    usual  its push [N], as of `usual_push`
     """
     rows = _felt(track) < share * usual
-    rows = lasting(rows, IDLE_S / median_step(track.time)) if rows.any() else rows
+    rows = lasting(rows, IDLE_S / track.step) if rows.any() else rows
     return rows if track.carrying is None else rows | ~track.carrying
 
 
@@ -78,7 +78,7 @@ def _felt(track: Track) -> Array:
     if not good.any() or len(track) < 2:
         return np.full(len(track), np.nan)
     force = np.where(good[:, None], track.channels["force"], 0.0)
-    return np.where(good, _push(force, 1 / median_step(track.time)), np.nan)
+    return np.where(good, _push(force, 1 / track.step), np.nan)
 
 
 def as_long(values: Any, rows: int) -> Any:

@@ -16,6 +16,7 @@ from scipy.special import gammainccinv
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
+from steelyard.logs.middles import median
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Rotation
 from steelyard.team.stacked import Stretch
@@ -71,12 +72,11 @@ class Slip:
     def renewed(self, part: Stretch, apart: Array, noise: Array, drifts: bool) -> Slip:
         """Return the slip from the residuals (T, 6) of its robot against the others' motion, as `find_slip`."""
         seen = part.seen[:, self.robot] & (part.time < self.until)
-        score, step = _steps(apart, seen, *_window(part.rate, drifts), noise)
-        row = int(np.argmax(score))
+        row, score, step = _step(apart, seen, *_window(part.rate, drifts), noise)
         middle = part.time[row]
         after, before = seen & (part.time > middle + GAP_S), seen & (part.time < middle - GAP_S)
-        full = step[row] if drifts else apart[after].mean(0) - apart[before].mean(0)
-        return replace(self, time=float(middle), step=full, score=float(score[row]))
+        full = step if drifts else apart[after].mean(0) - apart[before].mean(0)
+        return replace(self, time=float(middle), step=full, score=score)
 
     def beside(self, slips: Sequence[Slip]) -> Slip:
         """Return the slip, to be timed before others of its robot in its recording: they are clear, and known."""
@@ -163,9 +163,8 @@ def find_slip(number: int, part: Stretch, apart: Array, noise: Array, drifts: bo
     # Every row of every robot is a look; a chi-square of six numbers.
     threshold = float(2 * gammainccinv(3.0, CHANCE / (rows * count)))
     for i in range(count):
-        score, step = _steps(apart[:, i], seen[:, i], width, gap, noise[i])
-        row = int(np.argmax(score))
-        found.append(Slip(i, number, float(part.time[row]), step[row], float(score[row])))
+        row, score, step = _step(apart[:, i], seen[:, i], width, gap, noise[i])
+        found.append(Slip(i, number, float(part.time[row]), step, score))
     return clearest(slip for slip in found if slip.score > threshold and slip.large)
 
 
@@ -174,18 +173,18 @@ def _window(rate: float, drifts: bool) -> tuple[int, int]:
     return max(2, round((NEAR_S if drifts else WINDOW_S) * rate)), max(1, round(GAP_S * rate / 2))
 
 
-def _steps(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tuple[Array, Array]:
-    """Return, for every row, how clear a step there is (T,) and the step (T, 6); noise (6, 6) of a row."""
+def _step(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tuple[int, float, Array]:
+    """Return the row with the clearest step, how clear that is, and the step (6,); noise (6, 6) of a row."""
     step, good = _means_apart(np.ascontiguousarray(apart), np.ascontiguousarray(seen), width, gap, FILLED * width)
-    score = np.zeros(len(good))
-    if good.any():
-        along = np.abs(np.linalg.inv(np.linalg.cholesky(noise)) @ (step if good.all() else step[:, good]))
-        # The few windows of a recording tell the spread along one direction poorly: it is not taken below that of all.
-        spread = np.maximum(np.median(along, axis=1), np.median(along)) / 0.6745
-        score[good] = ((along / np.maximum(spread, 1e-300)[:, None]) ** 2).sum(0)
-    inner, every = slice(width + gap, len(seen) - width - gap), np.zeros((len(seen), 7))
-    every[inner, 0], every[inner, 1:] = score, step.T
-    return every[:, 0], every[:, 1:]
+    rows = np.flatnonzero(good)
+    if not len(rows):
+        return 0, 0.0, np.zeros(6)
+    along = np.abs(np.linalg.inv(np.linalg.cholesky(noise)) @ (step if good.all() else step[:, good]))
+    # The few windows of a recording tell the spread along one direction poorly: it is not taken below that of all.
+    spread = np.maximum(median(along), median(along.ravel())) / 0.6745
+    score = ((along / np.maximum(spread, 1e-300)[:, None]) ** 2).sum(0)
+    best = int(np.argmax(score))
+    return width + gap + int(rows[best]), float(score[best]), step[:, rows[best]]
 
 
 @numba.njit(cache=True, error_model="numpy")

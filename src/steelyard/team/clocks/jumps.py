@@ -22,9 +22,9 @@ from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.team.adjoint import turning_speed
-from steelyard.team.changes.presence import LIGHT, perhaps_idle, usual_pushes
+from steelyard.team.changes.presence import LIGHT, perhaps_idle, usual_push
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Errors, Step, joined, punctual
-from steelyard.team.clocks.shifts import LARGEST_S, LEAST_S, LEFT, STEP_S, WIDTH, Split, best_split, costs, lines
+from steelyard.team.clocks.shifts import LARGEST_S, LEAST_S, LEFT, STEP_S, WIDTH, Split, best_line, best_split, costs
 
 # Shifts are looked for up to so many seconds, and a share of the recording; speeds are those over OVER_S.
 FARTHEST_S, SHARE, OVER_S = 2.0, 0.25, 0.05
@@ -52,8 +52,7 @@ def cut_at_jumps(log: TeamLog, drifts: bool = False) -> tuple[TeamLog, ClockErro
 
     drifts  whether stamps of clocks that run so fast or slow that a fit would not find its way are put right, too
     """
-    usual = usual_pushes(log)
-    made = [part for r in log.recordings for part in _parts(log, r, MOST, drifts, usual)]
+    made = [part for r in log.recordings for part in _parts(log, r, MOST, drifts)]
     errors = ClockErrors(tuple(late for _, late in made))
     if not errors:
         return log, NOTHING
@@ -61,13 +60,11 @@ def cut_at_jumps(log: TeamLog, drifts: bool = False) -> tuple[TeamLog, ClockErro
     return errors.corrected(cut), errors
 
 
-def _parts(
-    log: TeamLog, recording: TeamRecording, most: int, drifts: bool, usual: Mapping[str, float]
-) -> list[tuple[TeamRecording, Errors]]:
+def _parts(log: TeamLog, recording: TeamRecording, most: int, drifts: bool) -> list[tuple[TeamRecording, Errors]]:
     """Return a recording, or its parts, each with what clocks are late by that run fast or jumped before it."""
     if recording.kind == "still":
         return [(recording, {})]
-    pairs = dict(_pairs(recording, log.reference, log.others, usual))
+    pairs = dict(_pairs(log, recording))
     for name in pairs if most else ():
         jump = pairs[name].jump()
         if jump is None:
@@ -78,7 +75,7 @@ def _parts(
         both = all(jump.name in part.tracks for jump in jumps for part in (first, second))
         if both and min(len(first.tracks), len(second.tracks)) > 1:
             more = {jump.name: ClockError(jump.after - jump.before) for jump in jumps}
-            before, after = (_parts(log, part, most - 1, drifts, usual) for part in (first, second))
+            before, after = (_parts(log, part, most - 1, drifts) for part in (first, second))
             return [*before, *((part, joined(more, late)) for part, late in after)]
     found = ((name, pair.drift()) for name, pair in pairs.items() if drifts)
     return [(recording, {name: drift for name, drift in found if drift is not None})]
@@ -125,22 +122,20 @@ def _alike(jump: Jump, others: Iterable[Jump | None]) -> Iterator[Jump]:
 
 @dataclass(frozen=True, eq=False)
 class _Pair:
-    """How fast two robots turn, x and y (T,) from `begin` [s] on, and what shifts within `far` leave of it.
+    """How fast the reference and another robot turn, x and y (T,) at `time`, and what shifts within `far` leave of it.
 
     cost   (2 far + 1, K) squares that every shift of y leaves of every bin, of `width` steps
-    light  (T,) where either may hold nothing
     """
 
+    log: TeamLog
     recording: TeamRecording
-    reference: str
     name: str
-    begin: float
+    time: Array
     x: Array
     y: Array
     far: int
     width: int
     cost: Array
-    light: Mask
 
     def jump(self) -> Jump | None:
         """Return where the clock surely jumps beside the reference's, None where it does not.
@@ -148,13 +143,22 @@ class _Pair:
         Who holds nothing for a while turns as he likes: the time in which both surely hold the payload must show it.
         """
         best = self._best(self.x, self.y)
-        if best is not None and self.light.any():
-            best = self._best(*(np.where(self.light, np.nan, speed) for speed in (self.x, self.y)))
+        if best is not None and (light := self._light()).any():
+            best = self._best(*(np.where(light, np.nan, speed) for speed in (self.x, self.y)))
         if best is None:
             return None
-        own, other = (self.recording.tracks[n] for n in (self.reference, self.name))
-        last, first = _place(own, other, self.begin + best.at, best.before, best.after)
+        own, other = (self.recording.tracks[n] for n in (self.log.reference, self.name))
+        last, first = _place(own, other, float(self.time[0]) + best.at, best.before, best.after)
         return Jump(self.name, last, first, best.before, best.after)
+
+    def _light(self) -> Mask:
+        """Return when (T,) either robot may hold nothing."""
+        out = np.zeros(len(self.time), np.bool_)
+        for name in (self.log.reference, self.name):
+            track = self.recording.tracks[name]
+            rows = perhaps_idle(track, LIGHT, usual_push(self.log, name))
+            out |= np.interp(self.time, track.time, rows) > 0
+        return out
 
     def _best(self, x: Array, y: Array) -> Split | None:
         """Return the best split of two speeds (T,), NaN where they tell nothing, if it is sure."""
@@ -173,33 +177,29 @@ class _Pair:
             return None
         bins, bin_s = self.cost.shape[1], STEP_S * self.width
         seconds = bin_s * (bins - 1)
-        least, start, grows = min(lines(self.cost, min(int(FASTEST * seconds / STEP_S), 2 * self.far)))
+        least, start, grows = best_line(self.cost, min(int(FASTEST * seconds / STEP_S), 2 * self.far))
         if abs(grows) * STEP_S < DRIFTS_S or least > LEFT * total or usual < DRIFTING * least:
             return None
-        middle = self.begin + STEP_S * self.far + 0.5 * bin_s * bins
+        middle = float(self.time[0]) + STEP_S * self.far + 0.5 * bin_s * bins
         return ClockError(STEP_S * (start - self.far), STEP_S * grows / seconds, middle)
 
 
-def _pairs(
-    recording: TeamRecording, reference: str, others: Sequence[str], usual: Mapping[str, float]
-) -> Iterator[tuple[str, _Pair]]:
+def _pairs(log: TeamLog, recording: TeamRecording) -> Iterator[tuple[str, _Pair]]:
     """Yield the pair of each robot and the reference of which enough is known."""
     begin, end = recording.span
     far = round(min(FARTHEST_S, SHARE * (end - begin)) / STEP_S)
     time = np.arange(begin, end - OVER_S, STEP_S)
-    if reference not in recording.tracks or len(time) * STEP_S < 2 * (LEAST_S + LARGEST_S):
+    if log.reference not in recording.tracks or len(time) * STEP_S < 2 * (LEAST_S + LARGEST_S):
         return
-    own = recording.tracks[reference]
-    x, light = _speed(own, time), _light(own, time, usual.get(reference, 0.0))
+    x = _speed(recording.tracks[log.reference], time)
     if x is None:
         return
     width = WIDTH * -(-((len(x) - 2 * far) // WIDTH) // FEW_BINS)
-    for name in others:
+    for name in log.others:
         track = recording.tracks.get(name)
         y = None if track is None else _speed(track, time)
-        if track is not None and y is not None:
-            either = light | _light(track, time, usual.get(name, 0.0))
-            yield name, _Pair(recording, reference, name, begin, x, y, far, width, costs(x, y, far, width), either)
+        if y is not None:
+            yield name, _Pair(log, recording, name, time, x, y, far, width, costs(x, y, far, width))
 
 
 def _speed(track: Track, time: Array) -> Array | None:
@@ -207,11 +207,6 @@ def _speed(track: Track, time: Array) -> Array | None:
     speed = turning_speed(track, time, OVER_S)
     good = np.isfinite(speed)
     return np.interp(time, time[good], speed[good]) if good.sum() > 0.5 * len(time) else None
-
-
-def _light(track: Track, time: Array, usual: float) -> Mask:
-    """Return when (T,) a robot may hold nothing, by its `usual` push [N]."""
-    return np.asarray(np.interp(time, track.time, perhaps_idle(track, LIGHT, usual)) > 0)
 
 
 def _place(own: Track, other: Track, near: float, before: float, after: float) -> tuple[float, float]:

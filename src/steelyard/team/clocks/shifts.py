@@ -5,7 +5,6 @@ Source: own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +46,7 @@ class Split:
         if not (far and self.fits > FITS and self.left < LEFT):
             return False
         # A shift that grows or falls steadily, by up to all that is looked for, leaves much more.
-        return min((left for left, _, _ in lines(self.cost, len(self.cost) - 1)), default=np.inf) > BETTER * self.both
+        return best_line(self.cost, len(self.cost) - 1)[0] > BETTER * self.both
 
 
 def best_split(x: Array, y: Array, common: int, most: int) -> Split | None:
@@ -67,48 +66,61 @@ def best_split(x: Array, y: Array, common: int, most: int) -> Split | None:
     known = inner[np.isfinite(inner)]
     varied = float(((known - known.mean()) ** 2).sum()) if len(known) else 0.0
     least = 1e-12 * float(np.nansum(inner**2)) + 1e-300
-    sums = np.cumsum(cost, axis=1)
-    rest = sums[:, -1:] - sums
-    at = int((sums.min(0) + rest.min(0))[ends:-ends].argmin()) + ends
-    i, j = int(sums[:, at].argmin()), int(rest[:, at].argmin())
-    one, two = (max(float(value), least) for value in (sums[i, at], rest[j, at]))
+    at = int((_leasts(cost)[:-1] + _leasts(cost[:, ::-1])[-2::-1])[ends : 1 - ends].argmin()) + ends
+    sums, rest = cost[:, : at + 1].sum(1), cost[:, at + 1 :].sum(1)
+    i, j = int(sums.argmin()), int(rest.argmin())
+    one, two = max(float(sums[i]), least), max(float(rest[j]), least)
     before, after = (STEP_S * (k - most + common) for k in (i, j))
     return Split(
         STEP_S * begin + BIN_S * (at + 1), before, after,
         (one + two) / (varied + least),
-        min(sums[j, at] / one, rest[i, at] / two), one + two, cost,
+        min(sums[j] / one, rest[i] / two), one + two, cost,
     )  # fmt: skip
+
+
+@njit(cache=True)
+def _leasts(cost: Array) -> Array:
+    """Return what the best shift leaves of the bins (K,) up to each; cost (S, K)."""
+    total, out = np.zeros(len(cost)), np.empty(cost.shape[1])
+    for k in range(cost.shape[1]):
+        total += cost[:, k]
+        out[k] = total.min()
+    return out
 
 
 @njit(cache=True)
 def costs(x: Array, y: Array, most: int, width: int) -> Array:
     """Return the squares (S, K) left between two speeds at every shift, summed over bins of `width` steps."""
     count, shifts = (len(x) - 2 * most) // width, 2 * most + 1
-    out, total = np.empty((shifts, count)), np.empty(shifts)
+    out = np.zeros((count, shifts))
     # Shifts innermost: their sums do not wait for one another.
     for k in range(count):
-        total[:] = 0.0
+        total = out[k]
         for t in range(k * width, (k + 1) * width):
             here, there = x[most + t], y[t : t + shifts]
             for shift in range(shifts):
                 off = here - there[shift]
                 total[shift] += off * off
-        for shift in range(shifts):
-            out[shift, k] = total[shift]
-    return out
+    return out.T
 
 
-def lines(cost: Array, most: int) -> Iterator[tuple[float, int, int]]:
-    """Yield what shifts leave that grow by so much [steps] over the bins, for all up to `most`: least, start, growth.
+@njit(cache=True)
+def best_line(cost: Array, most: int) -> tuple[float, int, int]:
+    """Return what shifts leave at the least that grow steadily over the bins by up to `most` steps, start, and growth.
 
     cost  (S, K) what every shift leaves of every bin
     """
     shifts, bins = cost.shape
-    along, where = np.linspace(-0.5, 0.5, bins), np.arange(bins)
-    for grows in np.arange(-(most // 2) * 2, most + 1, 2):
-        rows = np.round(grows * along).astype(np.int64)
-        starts = np.arange(-rows.min(), shifts - rows.max())
-        if len(starts):
-            left = cost[starts[:, None] + rows, where].sum(1)
-            best = int(left.argmin())
-            yield float(left[best]), int(starts[best]), int(grows)
+    along, total = np.linspace(-0.5, 0.5, bins), np.empty(shifts)
+    least, start, growth = np.inf, 0, 0
+    for grows in range(-(most // 2) * 2, most + 1, 2):
+        rows = np.rint(grows * along).astype(np.int64)
+        low, high = -rows.min(), shifts - rows.max()
+        total[:] = 0.0
+        for k in range(bins):
+            for first in range(low, high):
+                total[first] += cost[first + rows[k], k]
+        for first in range(low, high):
+            if total[first] < least:
+                least, start, growth = total[first], first, grows
+    return least, start, growth

@@ -149,9 +149,10 @@ class _Told:
             return None
         middle, half = 0.5 * float(part.time[0] + part.time[-1]), 0.5 * float(part.time[-1] - part.time[0])
         time, some = part.time[rows], len(robots)
-        apart, slope = apart[rows][:, robots], slope[rows][:, robots]
-        columns = np.concatenate([slope, slope * ((time - middle) / half)[:, None, None]], axis=1)
-        scores = Scores.of(apart, columns, np.tile(np.arange(some), 2), J[robots], W[robots], STRETCHES)
+        if len(rows) < len(apart) or some < len(J):
+            apart, slope = apart[rows][:, robots], slope[rows][:, robots]
+        powers = np.stack([np.ones(len(time)), (time - middle) / half], axis=1)
+        scores = Scores.of(apart, slope, np.arange(some), J[robots], W[robots], STRETCHES, powers)
         common = np.kron(np.eye(2), np.ones((some, some))) * np.trace(scores.information.sum(0)) / (2 * some)
         if not common.any():
             return None

@@ -19,10 +19,11 @@ from scipy.ndimage import uniform_filter1d
 from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.logs.conditioning import lowpass
+from steelyard.logs.middles import mean
 from steelyard.logs.runs import runs
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation, classical_acceleration, cross_matrix, unit_vectors
-from steelyard.team.adjoint import turns_between
+from steelyard.team.adjoint import turned_by, turns_between
 from steelyard.team.stacked import Stretch
 
 # The path is smoothed at so many times the highest frequency that is used, which leaves that band as it is.
@@ -190,18 +191,19 @@ def _resting(supported: Array) -> Array:
 
 def _moving(turn: Rotation, place: Array, gravity: Array, rate: float, cutoff_hz: float) -> Array:
     """Return the motion (T, 12) of a path that is smoothed, then differentiated."""
-    middle = Rotation.nearest(turn.matrix.mean(0))
+    middle = Rotation.nearest(mean(turn.matrix))
     path = np.concatenate([turns_between(middle, turn), place], axis=1)
     if cutoff_hz < 0.45 * rate:
         path = lowpass(path, cutoff_hz, rate)
-    turn, place = middle @ Rotation.exp(path[:, :3]), path[:, 3:]
+    turn, place = turned_by(middle, path[:, :3])[:, 0], path[:, 3:]
     omega = np.zeros((len(place), 3))
     near, far = turns_between(turn[1:-3], turn[3:-1]), turns_between(turn[:-4], turn[4:])
     omega[2:-2] = (8 * near - far) * (rate / 12)
     second = np.zeros_like(place)
     inner = 16 * (place[1:-3] + place[3:-1]) - 30 * place[2:-2] - place[:-4] - place[4:]
     second[2:-2] = inner * (rate**2 / 12)
-    return features(omega, slope(omega, rate), turn.inverse().apply(second - gravity))
+    lifted = (second - gravity)[:, None]
+    return features(omega, slope(omega, rate), (lifted @ turn.matrix)[:, 0])
 
 
 def slope(values: Array, rate: float) -> Array:

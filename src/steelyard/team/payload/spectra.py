@@ -19,6 +19,7 @@ from scipy.fft import dct
 
 from steelyard.check import Array, Integers
 from steelyard.inertia.regressor import basis
+from steelyard.logs.middles import mean
 from steelyard.spatial import cross_matrix
 from steelyard.team.payload.body_rows import BodyRows, Run, slope
 
@@ -29,6 +30,7 @@ FADE_SHARE, FADE_S = 0.1, 1.0
 # Motion and constant among all that is scattered: by these, and what stands still in the room, a wrench tells a body.
 SEEN = np.array([*range(12), -1])
 # Levers (U, 6, Q) of no biases that stand still in the room.
+FIRST = 16  # rows by which a column that is not all zero mostly shows
 NO_LEVERS = np.zeros((0, 6, 0))
 
 
@@ -112,9 +114,12 @@ def as_frequencies(columns: Sequence[Array], run: Run, highest_hz: float, faded:
     faded  whether rows are faded in and out
     """
     # Column after column: rows side by side take more than twice as long. Moments of passive gimbals are zero.
-    flat = np.concatenate([column.T for column in columns])
-    there = np.asarray(flat.any(1))
-    flat = flat[there] * fade(flat.shape[1], run.rate) if faded else flat[there]
+    every = [values for column in columns for values in column.T]
+    there = np.array([values[:FIRST].any() or values.any() for values in every], np.bool_)
+    window = fade(len(run.motion), run.rate) if faded else 1.0
+    flat = np.empty((int(there.sum()), len(run.motion)))
+    for line, k in zip(flat, np.flatnonzero(there), strict=True):
+        np.multiply(every[k], window, out=line)
     rows = len(frequencies(run, highest_hz))
     out = np.zeros((rows, len(there)))
     out[:, there] = dct(flat, axis=1, norm="ortho", overwrite_x=True)[:, :rows].T
@@ -144,17 +149,18 @@ def _in_bands(recording: BodyRows, lines: tuple[Array, ...], edges: Array, highe
     width = lines[0].shape[1] - beside
     scatter, rows = np.zeros((len(edges), width, width)), np.zeros(len(edges))
     room = np.zeros((len(edges), beside, width + beside))
-    judged, judged_rows, squares = scatter.copy(), rows.copy(), rows.copy()
+    squares = rows.copy()
+    judged, judged_rows = (scatter.copy(), rows.copy()) if recording.still else (scatter, rows)
     for run, z in zip(recording.runs, lines, strict=True):
         hz = frequencies(run, highest_hz)
         for band, chosen in enumerate(bands(hz, edges)):
-            scatter[band] += z[chosen, :width].T @ z[chosen, :width]
+            part = z[chosen, :width]
+            scatter[band] += part.T @ part
             room[band] += z[chosen, width:].T @ z[chosen]
             rows[band] += chosen.stop - chosen.start
             squares[band] += hz[chosen] @ hz[chosen]
-        begin = int(recording.still)
-        for band, chosen in enumerate(bands(hz[begin:], edges)):
-            part = z[begin:, :width][chosen]
+        for band, chosen in enumerate(bands(hz[1:], edges)) if recording.still else ():
+            part = z[1:, :width][chosen]
             judged[band] += part.T @ part
             judged_rows[band] += len(part)
     samples = sum(len(run.motion) for run in recording.runs)
@@ -162,13 +168,13 @@ def _in_bands(recording: BodyRows, lines: tuple[Array, ...], edges: Array, highe
     return Spectra(recording.name, recording.still, lines, scatter, room, rows, judged, judged_rows, samples, middle)
 
 
-def band_power(values: Array, run: Run, edges: Array, highest_hz: float) -> Array:
-    """Return the mean square (3, K) per row, in every band, of noise (T, D) in a path after 0, 1 and 2 differences.
+def band_power(values: Array, weight: Array, run: Run, edges: Array, highest_hz: float) -> Array:
+    """Return the sum by `weight` (D,) of squares (3, K) per row, in every band, of noise (T, D) in a path.
 
-    Bands without rows get nan.
+    After 0, 1 and 2 differences; bands without rows get nan.
     """
     hz = frequencies(run, highest_hz)
-    power = (as_frequencies([values], run, highest_hz, True) ** 2).mean(1)
+    power = as_frequencies([values], run, highest_hz, True) ** 2 @ weight
     gain = (2 * run.rate * np.sin(np.pi * hz / run.rate)) ** 2
     out = np.full((3, len(edges)), np.nan)
     for band, chosen in enumerate(bands(hz, edges)):
@@ -202,7 +208,7 @@ def motion_noise(
 
 def tilt_noise(recordings: Sequence[BodyRows], path: Array) -> Array:
     """Return the covariance (3, 3) of gravity in the body from that of its turns, the first of a path's row."""
-    down = np.mean([run.motion[:, 3:6].mean(0) for recording in recordings for run in recording.runs], axis=0)
+    down = np.mean([mean(run.motion[:, 3:6]) for recording in recordings for run in recording.runs], axis=0)
     return np.asarray(cross_matrix(down) @ path[:3, :3] @ cross_matrix(down).T)
 
 
@@ -211,12 +217,12 @@ def shares_of(recordings: Sequence[BodyRows], residuals: Sequence[Array], edges:
     total, rows = np.zeros((3, len(edges))), np.zeros(len(edges))
     for recording, residual in zip(recordings, residuals, strict=True):
         flat = residual.reshape(len(residual), -1)
-        size = np.sqrt((flat**2).mean(0))
-        flat = flat[:, size > 0] / size[size > 0]
-        if not flat.shape[1]:
+        square = np.einsum("tk,tk->k", flat, flat) / len(flat)
+        if not square.any():
             continue
+        weight = np.where(square > 0, 1 / np.maximum(square, 1e-300), 0.0) / np.count_nonzero(square)
         for run in recording.runs:
-            part = band_power(flat[run.rows], run, edges, highest_hz)
+            part = band_power(flat[run.rows], weight, run, edges, highest_hz)
             there = np.isfinite(part[0])
             total[:, there] += part[:, there] * len(run.motion)
             rows[there] += len(run.motion)

@@ -82,12 +82,14 @@ class Spread:
         part = self.blind[6 * robot : 6 * robot + 6]
         if not part.size:
             return np.zeros((0, 6))
-        u, s, _ = np.linalg.svd(self._turn(robot) @ part)
-        return np.asarray(u[:, : len(s)][:, s > 1e-3 * max(s.max(), 1e-300)].T)
+        u, s, _ = np.linalg.svd(self._turn(robot) @ part, full_matrices=False)
+        return np.asarray(u[:, s > 1e-3 * max(s.max(), 1e-300)].T)
 
     def _turn(self, robot: int) -> Array:
         """Return what turns (6, 6) a grasp's own axes into those of R."""
-        return np.kron(np.eye(2), self.grasps.rotation.matrix[robot])
+        out = np.zeros((6, 6))
+        out[:3, :3] = out[3:, 3:] = self.grasps.rotation.matrix[robot]
+        return out
 
     def delays(self, names: Sequence[str]) -> dict[str, float]:
         """Return the standard deviation of each robot's delay [s]."""
@@ -138,9 +140,10 @@ def _central(fit: PoseFit) -> Array:
 
 def _turned(rows: Array, central: Array) -> Array:
     """Return rows (..., 13 N) by parameters as rows by those with homes that turn about their grasp's middle."""
-    out = rows.copy()
-    for i, lever in enumerate(central):
-        out[..., OWN * i + 6 : OWN * i + 9] += rows[..., OWN * i + 9 : OWN * i + 12] @ lever
+    out = np.array(rows, order="C")
+    each = out.reshape(*rows.shape[:-1], -1, OWN)
+    for a, b in ((a, b) for a in range(3) for b in range(3) if a != b):
+        each[..., 6 + b] += each[..., 9 + a] * central[:, a, b]
     return out
 
 

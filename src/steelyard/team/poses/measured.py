@@ -18,9 +18,11 @@ import numpy as np
 
 from steelyard.check import Array, Integers, Mask
 from steelyard.errors import CannotAnswer
+from steelyard.logs.middles import mean
 from steelyard.logs.runs import distinct_rows
 from steelyard.spatial import Pose, Rotation
-from steelyard.team.adjoint import moved, turns_between
+from steelyard.team.adjoint import extent, moved, turns_between
+from steelyard.team.poses.rows import first_seen
 from steelyard.team.poses.solver import scatter
 from steelyard.team.stacked import Stretch
 
@@ -36,6 +38,7 @@ FEWEST = 8
 ROTATION_NOISE = 1e-3
 # Evenly spread rows that are enough.
 ENOUGH = 300
+ALL = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +106,12 @@ class TeamMotion:
 
     def motion_seen(self, grasps: Pose, homes: Pose) -> Pose:
         """Return the payload (T,) in the reference home as the first robot with a pose at that time sees it."""
-        if self.valid[:, 0].all():
-            return homes[0] @ self.poses[:, 0] @ grasps[0].inverse()
-        first = np.argmax(self.valid, axis=1)
-        return homes[first] @ self.poses[np.arange(len(first)), first] @ grasps[first].inverse()
+        G, Z = grasps, homes
+        turns, places = first_seen(
+            self.poses.rotation.matrix, self.poses.position, self.valid, G.rotation.matrix, G.position,
+            Z.rotation.matrix, Z.position,
+        )  # fmt: skip
+        return Pose.trusted(Rotation.trusted(turns), places)
 
     @cached_property
     def scatter(self) -> list[Array]:
@@ -137,16 +142,29 @@ class Team:
     motion: Pose
     delays: Array
 
+    @cached_property
+    def extent(self) -> Array:
+        """How far the payload turned and moved (2,), rms [rad, m]."""
+        return extent(self.motion)
+
+    @cached_property
+    def mean_turn(self) -> Array:
+        """Mean of the payload's rotation matrices (3, 3)."""
+        return mean(self.motion.rotation.matrix)
+
     def moved(self, steps: Array) -> Team:
         """Return the team with grasps, homes and delays a small step (N, 13) on, the motion where it is."""
         grasps, homes = moved(self.grasps, steps[:, :6]), moved(self.homes, steps[:, 6:12])
         return Team(grasps, homes, self.motion, self.delays + steps[:, 12])
 
 
-def first_team(data: TeamMotion, reference: int, names: tuple[str, ...], gravity: Array | None = None) -> Team:
+def first_team(
+    data: TeamMotion, reference: int, names: tuple[str, ...], gravity: Array | None = None, rows: slice = ALL
+) -> Team:
     """Return grasps and homes from pairs with the reference; raises CannotAnswer where two have no rows in common.
 
     gravity  (N, 3) its direction in every home, zero where that is not known; None = in none
+    rows     for which the motion is told
     """
     count = data.valid.shape[1]
     turns, places = np.tile(np.eye(3), (2, count, 1, 1)), np.zeros((2, count, 3))
@@ -165,7 +183,7 @@ def first_team(data: TeamMotion, reference: int, names: tuple[str, ...], gravity
         turns[:, robots] = G.rotation.matrix, Z.rotation.matrix
         places[:, robots] = G.position, Z.position
     G, Z = (Pose(Rotation(turn), place) for turn, place in zip(turns, places, strict=True))
-    return Team(G, Z, data.motion_seen(G, Z), np.zeros(count))
+    return Team(G, Z, data.rows(rows).motion_seen(G, Z), np.zeros(count))
 
 
 def _rows_in_common(data: TeamMotion, reference: int) -> list[tuple[Integers, list[int]]]:

@@ -26,6 +26,15 @@ def matrix_at(R: Array, t: int) -> Nine:
 
 
 @passes
+def turn_at(R: Array, t: int, i: int) -> Nine:
+    """Return the entries of one matrix of (T, N, 3, 3), row after row."""
+    return (
+        R[t, i, 0, 0], R[t, i, 0, 1], R[t, i, 0, 2], R[t, i, 1, 0], R[t, i, 1, 1], R[t, i, 1, 2], R[t, i, 2, 0],
+        R[t, i, 2, 1], R[t, i, 2, 2],
+    )  # fmt: skip
+
+
+@passes
 def three_at(p: Array, t: int) -> Three:
     """Return one vector of (T, 3)."""
     return p[t, 0], p[t, 1], p[t, 2]
@@ -105,7 +114,7 @@ def product(A: Nine, B: Nine) -> Nine:
 
 
 @passes
-def _across(A: Nine) -> Nine:
+def across(A: Nine) -> Nine:
     """Return the transpose."""
     return A[0], A[3], A[6], A[1], A[4], A[7], A[2], A[5], A[8]
 
@@ -116,14 +125,10 @@ def apart(X: Nine, place: Three, R: Array, p: Array, RG: Array, pG: Array, RZ: A
 
     The rotation is that of E = X^T Z R G^T; the position X^T (Z p - X g) needs it not.
     """
-    M = product(_across(X), matrix_at(RZ, i))
+    M = product(across(X), matrix_at(RZ, i))
     u, v, w = pZ[i, 0] - place[0], pZ[i, 1] - place[1], pZ[i, 2] - place[2]
     x, y, z = p[t, i, 0], p[t, i, 1], p[t, i, 2]
-    seen = (
-        R[t, i, 0, 0], R[t, i, 0, 1], R[t, i, 0, 2], R[t, i, 1, 0], R[t, i, 1, 1], R[t, i, 1, 2], R[t, i, 2, 0],
-        R[t, i, 2, 1], R[t, i, 2, 2],
-    )  # fmt: skip
-    E = product(product(M, seen), _across(matrix_at(RG, i)))
+    E = product(product(M, turn_at(R, t, i)), across(matrix_at(RG, i)))
     a, b, c = E[7] - E[5], E[2] - E[6], E[3] - E[1]
     share = _log_share(a, b, c, E[0] + E[4] + E[8])
     return (

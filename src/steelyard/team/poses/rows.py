@@ -7,6 +7,7 @@ import numpy as np
 from steelyard.check import Array, Integers, Mask
 from steelyard.team.poses.row_numbers import (
     NOTHING,
+    across,
     apart,
     home_pull,
     in_payload,
@@ -20,6 +21,7 @@ from steelyard.team.poses.row_numbers import (
     six_at,
     three_at,
     times,
+    turn_at,
     turn_by,
     write_six,
 )
@@ -68,6 +70,28 @@ def settled(
             turns[t, a, 0], turns[t, a, 1], turns[t, a, 2] = X[3 * a], X[3 * a + 1], X[3 * a + 2]
             places[t, a] = place[a]
     return turns, places, residual
+
+
+@passes
+def first_seen(R: Array, p: Array, valid: Mask, RG: Array, pG: Array, RZ: Array, pZ: Array) -> tuple[Array, Array]:
+    """Return where the first robot that is valid sees the payload, Z T G^-1 (T, 3, 3) and (T, 3)."""
+    T, N = p.shape[:2]
+    turns, places = np.empty((T, 3, 3)), np.empty((T, 3))
+    for t in range(T):
+        i = 0
+        while i < N - 1 and not valid[t, i]:
+            i += 1
+        if not valid[t, i]:
+            i = 0
+        Z, x, y, z, g = matrix_at(RZ, i), p[t, i, 0], p[t, i, 1], p[t, i, 2], three_at(pG, i)
+        X = product(product(Z, turn_at(R, t, i)), across(matrix_at(RG, i)))
+        for a in range(3):
+            turns[t, a, 0], turns[t, a, 1], turns[t, a, 2] = X[3 * a], X[3 * a + 1], X[3 * a + 2]
+            places[t, a] = (
+                pZ[i, a] + Z[3 * a] * x + Z[3 * a + 1] * y + Z[3 * a + 2] * z
+                - X[3 * a] * g[0] - X[3 * a + 1] * g[1] - X[3 * a + 2] * g[2]
+            )  # fmt: skip
+    return turns, places
 
 
 @passes

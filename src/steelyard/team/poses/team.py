@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
-from steelyard.team.adjoint import adjoint_inverse, extent, twists_between
+from steelyard.team.adjoint import adjoint_inverse, twists_between
 from steelyard.team.changes.found import Edit, without_changes
 from steelyard.team.changes.slips import Slip
 from steelyard.team.changes.slips_between import slip_between
@@ -67,10 +67,10 @@ class PoseTeam(MotionFit):
         late = dict.fromkeys(log.names, 0.0)
         parts = edit(parts)
         data = TeamMotion.of(parts)
-        start = first_team(data, reference, log.names, _down(log))
         enough = min(FEW_ROWS, max(ENOUGH, FEW_POSES // data.count))
         few = slice(None, None, max(1, len(data.valid) // enough))
-        fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGHLY)
+        start = first_team(data, reference, log.names, _down(log), few)
+        fit = fit_poses(data.rows(few), start, reference, close=ROUGHLY)
         timed = data
         if not clocks:
             fit = fit_poses(data, _followed(data, fit), reference, fit.noise)
@@ -112,22 +112,17 @@ class PoseTeam(MotionFit):
     @cached_property
     def rough(self) -> bool:
         """Whether poses err by a good part of what the payload moves, as they do where it is not rigid."""
-        return bool((self.fit.noise > LOUD * self._moved).any())
+        return bool((self.fit.noise > LOUD * self.fit.team.extent).any())
 
     @property
     def apart(self) -> Array | None:
         """By how much robots disagree (2,) [rad, m], where that is a good part of a turn that is more than it."""
         worst = self.fit.noise.max(0)
-        return worst if LOUD < worst[0] / self._moved[0] < STILL_TURNS else None
-
-    @cached_property
-    def _moved(self) -> Array:
-        """How far the payload turned and moved (2,), rms [rad, m]."""
-        return extent(self.fit.team.motion)
+        return worst if LOUD < worst[0] / self.fit.team.extent[0] < STILL_TURNS else None
 
     def down(self, log: TeamLog) -> Array:
         """Return the mean direction of gravity (3,) in R."""
-        mean = self.fit.team.motion.rotation.inverse().apply(mean_gravity(log, self.fit.team.homes)).mean(0)
+        mean = mean_gravity(log, self.fit.team.homes) @ self.fit.team.mean_turn
         return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
 
     def tilt(self, log: TeamLog, spread: Spread) -> Tilted | None:
@@ -146,8 +141,7 @@ class PoseTeam(MotionFit):
     def level(self, log: TeamLog) -> Array:
         """Return the direction of gravity over how well it is known (N, 3), as in `Spread`."""
         team, said = self.fit.team, _down(log)
-        mean = team.motion.rotation.inverse().matrix.mean(0)
-        seen = np.einsum("ab,nbc,nc->na", mean, team.homes.rotation.matrix, said)
+        seen = np.einsum("ba,nbc,nc->na", team.mean_turn, team.homes.rotation.matrix, said)
         own = seen[log.names.index(log.reference)]
         apart = np.linalg.norm(seen - own, axis=1, keepdims=True)
         told = said.any(1, keepdims=True) & own.any()

@@ -133,8 +133,9 @@ def _mean_wrench(log: TeamLog) -> Array:
     """Return the mean wrench (N, 6) that every robot measured."""
     out = np.zeros((len(log.names), 6))
     for i, name in enumerate(log.names):
-        rows = [t.wrench()[t.valid["force"]] for _, t in log.tracks_of(name) if t.has("force")]
-        out[i] = np.concatenate(rows).mean(0) if rows else 0.0
+        tracks = [track for _, track in log.tracks_of(name) if track.has("force")]
+        total = sum((track.wrench().T @ track.valid["force"] for track in tracks), np.zeros(6))
+        out[i] = total / max(sum(int(track.valid["force"].sum()) for track in tracks), 1)
     return out
 
 
