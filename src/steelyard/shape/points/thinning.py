@@ -10,6 +10,7 @@ import numpy as np
 from steelyard.check import Array, Integers
 
 _ROUNDS = 12
+_BESIDE = (0, -1, 1)  # the cubes about one, itself first
 _LEAP = 2.0  # on a regular grid nothing goes at first, then half at once
 
 
@@ -18,7 +19,7 @@ def spread(xyz: Array, normal: Array, order: Integers, radius: float) -> Integer
 
     Points whose normals (N, 3) are more than a right angle apart do not hinder each other.
     """
-    return np.asarray(_taken(xyz, normal, order, radius, cubes(xyz, radius)))
+    return np.asarray(_taken(xyz, normal, order, radius))
 
 
 def cubes(xyz: Array, edge: float) -> Integers:
@@ -51,32 +52,37 @@ def in_cubes(xyz: Array, edge: float) -> Integers:
     return np.argsort((cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2], kind="stable")
 
 
-@numba.njit(cache=True, nogil=True)
-def _taken(xyz: Any, normal: Any, order: Any, radius: float, key: Any) -> Any:
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _taken(xyz: Any, normal: Any, order: Any, radius: float) -> Any:
     bits = 1
     while bits < 4 * len(xyz):
         bits *= 2
-    head = np.full(bits, -1, np.int64)  # a cube's place is hashed: strangers in it are told apart by their distance
-    follow = np.full(len(xyz), -1, np.int64)
+    head = np.full(bits, -1, np.int32)  # a cube's place is hashed: strangers in it are told apart by their distance
+    follow = np.full(len(xyz), -1, np.int32)
     out = np.empty(len(xyz), np.int64)
     n = 0
     for i in order:
+        # Most that do not stay are held off by one in their own cube or below or above it.
+        x, y, z = xyz[i, 0] / radius, xyz[i, 1] / radius, xyz[i, 2] / radius
+        a, b, c = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
         free = True
-        for di in range(-1, 2):
-            for dj in range(-1, 2):
-                for dk in range(-1, 2):
-                    j = head[_place(key[i, 0] + di, key[i, 1] + dj, key[i, 2] + dk, bits)] if free else -1
-                    while j >= 0:
-                        gap, agree = 0.0, 0.0
-                        for c in range(3):
-                            gap += (xyz[i, c] - xyz[j, c]) ** 2
-                            agree += normal[i, c] * normal[j, c]
-                        if gap < radius * radius and agree > 0:
-                            free = False
-                            break
-                        j = follow[j]
+        for m in range(9):
+            start = _column(a + _BESIDE[m // 3], b + _BESIDE[m % 3]) + c
+            for up in _BESIDE:
+                j = head[(start + up) & (bits - 1)] if free else -1
+                while j >= 0:
+                    gap, agree = 0.0, 0.0
+                    for axis in range(3):
+                        gap += (xyz[i, axis] - xyz[j, axis]) ** 2
+                        agree += normal[i, axis] * normal[j, axis]
+                    if gap < radius * radius and agree > 0:
+                        free = False
+                        break
+                    j = follow[j]
+            if not free:
+                break
         if free:
-            place = _place(key[i, 0], key[i, 1], key[i, 2], bits)
+            place = (_column(a, b) + c) & (bits - 1)
             follow[i] = head[place]
             head[place] = i
             out[n] = i
@@ -85,5 +91,6 @@ def _taken(xyz: Any, normal: Any, order: Any, radius: float, key: Any) -> Any:
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
-def _place(i: int, j: int, k: int, bits: int) -> int:
-    return int((i * 73856093 ^ j * 19349663 ^ k * 83492791) & (bits - 1))
+def _column(i: int, j: int) -> int:
+    """Return where the places of a column of cubes begin: its cubes lie side by side in memory."""
+    return int(i * 73856093 ^ j * 19349663)

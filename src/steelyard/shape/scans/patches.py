@@ -63,13 +63,15 @@ def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int)
     return support
 
 
-def settled_patches(
-    scene: Scene, patches: Array, points: int, apart: float, window: float, rounds: int
-) -> tuple[Array, Array, Array]:
-    """Return well-spread patches, those of most pixels first, `apart` [m]: points, normals and support (N, 3)."""
+def well_spread(patches: Array, points: int, apart: float) -> Array:
+    """Return about so many of patches (N, 8), those of most pixels first, `apart` [m]."""
     order = np.argsort(-patches[:, 6], kind="stable")
-    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, points, apart)
-    xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
+    return np.asarray(patches[spread_to(patches[:, :3], patches[:, 3:6], order, points, apart)[0]])
+
+
+def settled_patches(scene: Scene, patches: Array, window: float, rounds: int) -> tuple[Array, Array, Array]:
+    """Return points, normals and support (N, 3) of patches (N, 8) moved to what the views measure."""
+    xyz, normal = patches[:, :3].copy(), patches[:, 3:6].copy()
     return xyz, normal, settled(scene, xyz, normal, window, rounds)
 
 
@@ -79,7 +81,7 @@ def surface_of(scene: Scene, patches: Array, region: Region, points: int) -> tup
     CannotAnswer where nothing stands out of that.
     """
     mask = region.mask
-    xyz, normal, support = settled_patches(scene, patches, _SEEDS * points, scene.pixel, WINDOW, 2)
+    xyz, normal, support = settled_patches(scene, well_spread(patches, _SEEDS * points, scene.pixel), WINDOW, 2)
     good = (support[:, 0] >= scene.enough) & (support[:, 1] <= 0.5 * support[:, 0])
     table = good & (normal[:, 2] > 0.9) & (np.abs(xyz[:, 2]) < 4 * scene.sigma)
     level, rough = 0.0, 0.1 * scene.sigma

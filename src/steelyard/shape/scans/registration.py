@@ -14,7 +14,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape.scans.common_table import slid
 from steelyard.shape.scans.depth_images import FACING
-from steelyard.shape.scans.patches import no_surface, settled, settled_patches, surface_of, surfels
+from steelyard.shape.scans.patches import no_surface, settled, settled_patches, surface_of, surfels, well_spread
 from steelyard.shape.scans.pose_errors import PoseErrors
 from steelyard.shape.scans.region import Region, object_on_table
 from steelyard.shape.scans.scene import WINDOW, Scene
@@ -46,12 +46,14 @@ class Seen:
     """The object as the views have it together.
 
     region   where it lies      patches  (N, 8) of its surface and of the table around it
+    model    (M, 8) well-spread ones of those, which views are fitted to
     spread   median spread of the views about the surface, in standard deviations of depth
     errors   what is believed of the reported poses, None where the cameras are still there
     """
 
     region: Region
     patches: Array
+    model: Array
     spread: float
     errors: PoseErrors | None = None
 
@@ -60,13 +62,14 @@ class Seen:
         """Return what the views see from where their cameras now are; CannotAnswer where they agree on nothing."""
         region = object_on_table(scene)
         patches = surfels(scene, region)
-        xyz, normal = _model(scene, patches, _NEAR)
+        model = well_spread(patches, _MODEL, 2 * scene.pixel)
+        xyz, normal = _model(scene, model, _NEAR)
         support = settled(scene, xyz, normal, _NEAR, 1)
         good = support[:, 0] >= scene.enough
         if not good.any():
             raise no_surface()
         expected = _expected(scene, xyz[good], normal[good]) * _of_few(support[good, 0])
-        return cls(region, patches, float(np.median(support[good, 2] / expected)))
+        return cls(region, patches, model, float(np.median(support[good, 2] / expected)))
 
 
 def _of_few(views: Array) -> Array:
@@ -216,16 +219,16 @@ def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...], level: bool, n
 
 def _sights(scene: Scene, seen: Seen, window: float) -> Sights:
     """Return the views and the surface that they give together, which may be off by a window [m]."""
-    xyz, normal = _model(scene, seen.patches, window)
+    xyz, normal = _model(scene, seen.model, window)
     return Sights(scene.images, xyz, normal, window + 4 * scene.sigma, scene.noise, scene.given, xyz.mean(0))
 
 
 def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
-    """Return well-spread points (N, 3) of the surface that all views give together, and their normals.
+    """Return the points (N, 3) of patches (N, 8) as all views have them together, and their normals.
 
     CannotAnswer where they give none.
     """
-    xyz, normal, support = settled_patches(scene, patches, _MODEL, 2 * scene.pixel, window, 1)
+    xyz, normal, support = settled_patches(scene, patches, window, 1)
     good = support[:, 0] >= scene.enough
     if not good.any():
         raise no_surface()

@@ -59,6 +59,15 @@ def _projected(images: Images, cameras: Any, x: Any, place: Any, at: Any) -> Non
         at[k] = np.int64((float(k) * height + v) * width + u if falls else 0.0)
 
 
+@numba.njit(cache=True, nogil=True)
+def _fetched(images: Images, cameras: Any, x: Any, work: Any, at: Any) -> None:
+    """Write what every view measures where it has a point x (3,): work (8, V) as in `_looked`, from row 3 on."""
+    pixels, measured = images.depth.reshape(-1), work[6]
+    _projected(images, cameras, x, work[3:6], at)
+    for k in range(len(at)):
+        measured[k] = pixels[at[k]]
+
+
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _incidence(cameras: Any, x: Any, n: Any, cosine: Any) -> None:
     """Write the cosine of incidence of every view's sight line on a point (3,) with normal n (3,)."""
@@ -83,7 +92,7 @@ def _looked(images: Images, cameras: Any, x: Any, n: Any, window: float, noise: 
     _incidence(cameras, x, n, work[2])
     _projected(images, cameras, x, work[3:6], at)
     for k in range(len(at)):
-        measured[k] = pixels[at[k]]
+        measured[k] = pixels[at[k] if work[2, k] >= FACING else 0]  # others say nothing: their pixels are not fetched
     _said(images.unit, images.lens, cameras, x, n, window, noise, work)
 
 
@@ -185,8 +194,7 @@ def seen_past(images: Images, points: Any, margin: float, noise: float, enough: 
     cameras = _laid_out(images)
     work, at = _room(len(images.p))
     last, known = np.empty(enough, np.int64), 0
-    pixels, beyond = images.depth.reshape(-1), work[6]
-    out = np.zeros(len(points), np.int64)
+    beyond, out = work[6], np.zeros(len(points), np.int64)
     for i in range(len(points)):
         again = known == enough
         for m in range(enough if again else 0):
@@ -196,9 +204,7 @@ def seen_past(images: Images, points: Any, margin: float, noise: float, enough: 
         if again:
             out[i] = enough
             continue
-        _projected(images, cameras, points[i], work[3:6], at)
-        for k in range(len(at)):
-            beyond[k] = pixels[at[k]]
+        _fetched(images, cameras, points[i], work, at)
         known = _behind(work, images.unit, margin, noise)
         if known >= enough:
             known = 0
@@ -216,16 +222,25 @@ def sights(images: Images, points: Any, noise: float) -> Any:
 
     Within 3 standard deviations of the depth noise, and three pixel widths before it for a surface seen flat.
     """
-    out, depth = np.zeros((len(points), 2)), images.depth
+    cameras = _laid_out(images)
+    work, at = _room(len(images.p))
+    out = np.zeros((len(points), 2))
     for i in range(len(points)):
-        for k in range(len(depth)):
-            z, u, v = pixel_of(images, k, points[i])
-            if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
-                continue
-            behind, error = depth[k, v, u] * images.unit - z, 3 * noise * z * z
-            out[i, 0] += behind > error
-            out[i, 1] += -error - 3 * z / images.lens[0] <= behind <= error
+        _fetched(images, cameras, points[i], work, at)
+        out[i] = _past_and_on(work, images.unit, images.lens[0], noise)
     return out
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _past_and_on(work: Any, unit: float, focal: float, noise: float) -> tuple[int, int]:
+    """Return how many views measured something behind a point, and how many something there."""
+    depth, measured, past, on = work[3], work[6], 0, 0
+    for k in range(len(depth)):
+        z = depth[k]
+        behind, error = measured[k] * unit - z, 3 * noise * z * z
+        past += (z > 0) & (behind > error)
+        on += (z > 0) & (-error - 3 * z / focal <= behind) & (behind <= error)
+    return past, on
 
 
 @numba.njit(cache=True, nogil=True)

@@ -7,10 +7,10 @@ from typing import Any
 import numba
 import numpy as np
 
-from steelyard.shape.scans.depth_images import Images, normal_of, pixel_of
+from steelyard.shape.scans.depth_images import Images, lent, normal_of, pixel_of
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def surfels(
     images: Images, stride: int, step: int, mask: Any, low: Any, pitch: float, cell: float, floor: float, layers: int,
     noise: float,
@@ -23,6 +23,7 @@ def surfels(
     floor   lowest height looked at [m], `layers` cubes up from it
     noise   standard deviation of depth at 1 m; it grows with the square
     """
+    images = lent(images)
     depth, unit, (fx, fy, cx, cy), R, p = images
     count, height, width = depth.shape
     box = _box_of(mask, low, pitch, floor, layers * cell)
@@ -63,12 +64,23 @@ def surfels(
                         size *= 2
                     row = index[main, layer, i, j] = n
                     n += 1
-                for column, number in enumerate((x, y, h, nx, ny, nz, 1.0)):
-                    sums[row, column] += number
+                _add(sums[row], x, y, h, nx, ny, nz)
                 if last[row] != k:
                     sums[row, 7] += 1
                     last[row] = k
     return _means(sums[:n])
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _add(patch: Any, x: float, y: float, h: float, nx: float, ny: float, nz: float) -> None:
+    """Add a pixel to the sums (8,) of its patch, but for the count of views."""
+    patch[0] += x
+    patch[1] += y
+    patch[2] += h
+    patch[3] += nx
+    patch[4] += ny
+    patch[5] += nz
+    patch[6] += 1.0
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)

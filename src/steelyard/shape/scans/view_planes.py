@@ -115,15 +115,13 @@ def lowest_planes(sampled: Array, reach: float, clear: float, steepest: float, d
             end += 1
         if n < _FEW:
             continue
-        step, best, plane = max(1, n // _JUDGING), -np.inf, np.zeros(3)
+        judges = sampled[near[: n : max(1, n // _JUDGING)], :3].T.copy()
+        best, plane = -np.inf, np.zeros(3)
         for t in range(-1, len(drawn)):  # the first is the level one
             tried = np.zeros(3) if t < 0 else _through(sampled, near[(n * drawn[t]).astype(np.int64)])
             if abs(tried[0]) > reach or np.hypot(tried[1], tried[2]) > steepest:
                 continue
-            score = 0.0
-            for i in near[:n:step]:
-                height = sampled[i, 2] - tried[0] - tried[1] * sampled[i, 0] - tried[2] * sampled[i, 1]
-                score += 1.0 if abs(height) < clear else -_UNDER if height < 0 else 0.0
+            score = _weight(judges, tried, clear)
             if score > best:
                 best, plane = score, tried
         out[count, 0], out[count, 1:] = view, plane
@@ -132,11 +130,25 @@ def lowest_planes(sampled: Array, reach: float, clear: float, steepest: float, d
 
 
 @numba.njit(cache=True, nogil=True)
+def _weight(judges: Array, plane: Array, clear: float) -> float:
+    """Return how many of the points (3, N) lie on a plane, less those under it; in whole numbers, several at once."""
+    x, y, z = judges[0], judges[1], judges[2]
+    a, b, c = plane[0], plane[1], plane[2]
+    on = under = 0
+    for i in range(len(x)):
+        height = z[i] - a - b * x[i] - c * y[i]
+        on += abs(height) < clear
+        under += height <= -clear
+    return on - _UNDER * under
+
+
+@numba.njit(cache=True, nogil=True)
 def _through(xyz: Any, rows: Any) -> Any:
     """Return the height a + b x + c y (3,) of the plane through three points; one that is far off where none is."""
     A, b = np.ones((3, 3)), np.empty(3)
     for r in range(3):
         A[r, 1], A[r, 2], b[r] = xyz[rows[r], 0], xyz[rows[r], 1], xyz[rows[r], 2]
-    if abs(np.linalg.det(A)) < 1e-12:
+    one, other = A[1] - A[0], A[2] - A[0]
+    if abs(one[1] * other[2] - one[2] * other[1]) < 1e-12:
         return np.full(3, np.inf)
     return np.linalg.solve(A, b)

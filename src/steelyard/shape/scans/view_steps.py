@@ -18,7 +18,8 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape.scans.depth_images import FACING, Images, normal_of, pixel_of
+from steelyard.shape.hulls.borrowed import borrowed
+from steelyard.shape.scans.depth_images import FACING, Images, lent, normal_of, pixel_of
 from steelyard.shape.scans.pose_errors import PoseErrors
 from steelyard.spatial import Pose, Rotation
 
@@ -127,9 +128,10 @@ def steps_together(sights: Sights, information: Array, off: Array) -> Array:
     return np.asarray(steps - steps.mean(0))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _of_views(images: Images, xyz: Any, normal: Any, middle: Any, window: float, noise: float) -> Any:
     """Return Hessian (V, 6, 6) and gradient (V, 6) of half the squared distances of each view, in stds of depth."""
+    images, xyz, normal = lent(images), borrowed(xyz), borrowed(normal)
     H, g, row = np.zeros((len(images.R), 6, 6)), np.zeros((len(images.R), 6)), np.empty(6)
     for k in range(len(images.R)):
         for i in range(len(xyz)):
@@ -144,19 +146,20 @@ def _of_views(images: Images, xyz: Any, normal: Any, middle: Any, window: float,
     return H, g
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def weight_of(over: float, sigma: float) -> float:
     """Return Huber's weight [1/m^2] of a distance `over` with standard deviation sigma [m]."""
     return 1 / sigma**2 * min(1.0, 2 * sigma / (abs(over) + 1e-12))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _together(images: Images, xyz: Any, normal: Any, middle: Any, window: float, noise: float) -> Any:
     """Return what half the squared distances of the views from their mean change with their steps.
 
     Gradient (V, 6), and the Hessian as its blocks (V, 6, 6) as if the mean stood still, less the square of a matrix
     (N, V, 6): how the mean goes with the steps at each point.
     """
+    images, xyz, normal = lent(images), borrowed(xyz), borrowed(normal)
     views = len(images.R)
     g, own, mean_row = np.zeros((views, 6)), np.zeros((views, 6, 6)), np.zeros((len(xyz), views, 6))
     row, over, weight = np.empty((views, 6)), np.empty(views), np.empty(views)
@@ -177,7 +180,7 @@ def _together(images: Images, xyz: Any, normal: Any, middle: Any, window: float,
     return g, own, mean_row
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def measured(images: Images, k: int, x: Any, n: Any, row: Any, middle: Any, noise: float) -> Any:
     """Return whether view k faces a point x (3,) with normal n (3,), how high over it it measures and how surely [m].
 
@@ -186,8 +189,10 @@ def measured(images: Images, k: int, x: Any, n: Any, row: Any, middle: Any, nois
     depth, unit, (fx, fy, cx, cy), R, p = images
     dx, dy, dz = x[0] - p[k, 0], x[1] - p[k, 1], x[2] - p[k, 2]
     cosine = -(dx * n[0] + dy * n[1] + dz * n[2]) / np.sqrt(dx * dx + dy * dy + dz * dz)
+    if cosine < FACING:
+        return False, 0.0, 1.0
     z, u, v = pixel_of(images, k, x)
-    if cosine < FACING or u < _BESIDE or v < _BESIDE or u >= depth.shape[2] - _BESIDE or v >= depth.shape[1] - _BESIDE:
+    if u < _BESIDE or v < _BESIDE or u >= depth.shape[2] - _BESIDE or v >= depth.shape[1] - _BESIDE:
         return False, 0.0, 1.0
     m = depth[k, v, u] * unit
     a, b = (u - cx) / fx, (v - cy) / fy
@@ -205,7 +210,7 @@ def measured(images: Images, k: int, x: Any, n: Any, row: Any, middle: Any, nois
     return True, over, noise * z * z * cosine + _FLOOR
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _faces_alike(images: Images, k: int, u: int, v: int, a: float, b: float, m: float, n: Any, noise: float) -> bool:
     """Whether the surface at pixel (u, v), of depth m [m], faces about as n (3,) does.
 
