@@ -342,7 +342,8 @@ def test_a_cloth_with_folds_is_named(box: Scanned) -> None:
     assert "table-uneven" not in {finding.code for finding in fuse(views).findings}
     # What the folds may hide under the box, as a share of its 30 mm, is in the bar.
     assert shape_of(scan).solid.volume_std > 0.0015 / 0.03
-    assert fuse(views).space.unsure_m3 == 0.0
+    # Where there are none, only what a rim may leave open below.
+    assert fuse(views).space.unsure_m3 < 0.001 * (0.1 * 0.06 * 0.03)
 
 
 def test_an_object_taller_than_the_cameras_are_far_keeps_its_top() -> None:
