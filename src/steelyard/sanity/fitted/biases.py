@@ -109,11 +109,10 @@ def drift_of(log: MotionLog) -> Drift | None:
     rows, _ = Rows.of(log)
     if not rows.split:
         return None
-    settling = rows.settling()
-    steady, moving = rows.solve(), rows.solve(rows.drifting(settling), jackknife=True)
+    steady, moving = rows.solve(), rows.solve(rows.drifting(), jackknife=True)
     weight = abs(float(steady.phi[0])) * float(np.linalg.norm(log.gravity, axis=1).mean())
     span = float(log.time[-1] - log.time[0])
-    return Drift(moving.extra, moving.extra_std, moving.beside(steady), weight, span, settling)
+    return Drift(moving.extra, moving.extra_std, moving.beside(steady), weight, span, rows.settling)
 
 
 @dataclass(frozen=True, eq=False)

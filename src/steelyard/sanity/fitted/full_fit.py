@@ -7,6 +7,7 @@ How well a log shows the motion of its load decides which of them may be judged.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -167,7 +168,7 @@ class Rows:
         """Return the weighted residuals (N, 6)."""
         return np.asarray((self.values - self._with(extra) @ fit.solution) * np.sqrt(self.weights))
 
-    @property
+    @cached_property
     def _second(self) -> Integers:
         """The second of the log (N,) that each row is in; rows of a table are one by one."""
         if self.log.time is None:
@@ -182,11 +183,12 @@ class Rows:
         """Return columns (N, 6, 6) of a bias that drifts by one over the log, and settles as given or as it shows."""
         if self.log.time is None:
             return np.zeros((len(self.values), 6, 6))
-        settling = self.settling() if settling is None else settling
+        settling = self.settling if settling is None else settling
         return np.asarray(settled_course(self.log.time, settling)[:, None, None] * np.eye(6) / 2)
 
+    @cached_property
     def settling(self) -> float:
-        """Return the time constant [s] in which a drift settles; infinite where a line leaves hardly more.
+        """The time constant [s] in which a drift settles; infinite where a line leaves hardly more.
 
         What it leaves is compared in means over a second: white noise hides a drift, and does not last.
         """
