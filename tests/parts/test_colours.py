@@ -9,9 +9,9 @@ import pytest
 from parts_blocks import body, inside, solid
 from scipy.spatial import cKDTree
 
-from steelyard.parts.colours import _without_blends, colour_modes
-from steelyard.parts.light import Light
-from steelyard.parts.prints import without_prints
+from steelyard.parts.colour.light import Light
+from steelyard.parts.colour.modes import _without_blends, colour_modes
+from steelyard.parts.colour.prints import without_prints
 from steelyard.parts.skin import skin_of
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.volume import enclose

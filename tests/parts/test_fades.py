@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from parts_blocks import body, solid
 
-from steelyard.parts.colours import colour_modes
-from steelyard.parts.fades import without_fades
+from steelyard.parts.colour.fades import without_fades
+from steelyard.parts.colour.modes import colour_modes
 from steelyard.parts.skin import skin_of
 
 BAR = ((0, 0, 0), (0.12, 0.02, 0.02))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from steelyard.bench.shapes.hull_sets import KINDS
+from steelyard.parts.htc.reach import MOST, reach, room
+from steelyard.parts.htc.small_hulls import five_faces, four_faces
 from steelyard.parts.hulls import both, hulls_of, keep, keep_in_place
-from steelyard.parts.reach import MOST, reach, room
-from steelyard.parts.small_hulls import five_faces, four_faces
 from steelyard.shape.hull import TOLERANCE, hull_volume, hull_work, qhull
 
 

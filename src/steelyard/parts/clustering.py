@@ -15,7 +15,7 @@ import numpy as np
 from steelyard.check import Integers
 from steelyard.errors import BadValue
 from steelyard.parts.hierarchy import Hierarchy
-from steelyard.parts.merging import merge_all
+from steelyard.parts.htc.merging import merge_all
 from steelyard.shape.hull import TOLERANCE
 from steelyard.shape.pairs import distinct_pairs
 from steelyard.shape.tets import TetMesh

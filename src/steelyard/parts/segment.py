@@ -14,14 +14,14 @@ import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
-from steelyard.parts.colours import colour_modes
+from steelyard.parts.colour.fades import without_fades
+from steelyard.parts.colour.modes import colour_modes
+from steelyard.parts.colour.prints import without_prints
 from steelyard.parts.description import cuts_of
 from steelyard.parts.doubt import doubts
-from steelyard.parts.fades import without_fades
 from steelyard.parts.inner_borders import cut_at_borders
 from steelyard.parts.pieces import cell_colours, pieces_of, with_points
-from steelyard.parts.prints import without_prints
-from steelyard.parts.seams import seam_tree
+from steelyard.parts.seams.tree import seam_tree
 from steelyard.parts.segmentation import Segmentation
 from steelyard.parts.skin import Skin, skin_of
 from steelyard.shape.cloud import Cloud

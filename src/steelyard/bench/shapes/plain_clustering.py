@@ -10,7 +10,7 @@ import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.parts.hierarchy import Hierarchy
-from steelyard.parts.merging import GRAIN
+from steelyard.parts.htc.merging import GRAIN
 from steelyard.shape.hull import qhull
 from steelyard.shape.tets import TetMesh
 

@@ -15,10 +15,10 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.parts.edge_heap import Heap, empty_heap, remove, settle
+from steelyard.parts.htc.edge_heap import Heap, empty_heap, remove, settle
+from steelyard.parts.htc.reach import MOST, Room, reach, room
+from steelyard.parts.htc.small_hulls import five_faces, five_volume, four_faces
 from steelyard.parts.hulls import Hulls, both, hulls_of, keep, keep_in_place
-from steelyard.parts.reach import MOST, Room, reach, room
-from steelyard.parts.small_hulls import five_faces, five_volume, four_faces
 from steelyard.shape.hull import HullWork, hull_volume, hull_work
 from steelyard.shape.hulls.borrowed import borrowed, integer
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Integers
-from steelyard.parts.colours import NEIGHBOURS, ColourModes
-from steelyard.parts.prints import patches
+from steelyard.parts.colour.modes import NEIGHBOURS, ColourModes
+from steelyard.parts.colour.prints import patches
 from steelyard.parts.skin import Skin
 from steelyard.shape.points.spacing import nearest
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.parts.hulls import Hulls, both, keep, keep_in_place
-from steelyard.parts.seam_costs import PAINT, WIDTH, price_of, support_of
+from steelyard.parts.seams.costs import PAINT, WIDTH, price_of, support_of
 from steelyard.shape.hull import HullWork, hull_volume
 
 _NEARER = 1e-3  # of all bits equally dear to join, the nearest: per cube root of the volume between their middles

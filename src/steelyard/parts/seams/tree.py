@@ -19,8 +19,8 @@ import numpy as np
 from steelyard.check import Array, Integers
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.hulls import hulls_of
-from steelyard.parts.seam_costs import AREA, BEHIND, LENGTH, TURN, VECTOR, WIDTH
-from steelyard.parts.seam_merges import Clusters, merge
+from steelyard.parts.seams.costs import AREA, BEHIND, LENGTH, TURN, VECTOR, WIDTH
+from steelyard.parts.seams.merges import Clusters, merge
 from steelyard.parts.skin import Skin
 from steelyard.shape.hull import hull_work
 from steelyard.shape.pairs import joined

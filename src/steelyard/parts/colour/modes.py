@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array, Integers
-from steelyard.parts.light import Light, light_on
+from steelyard.parts.colour.light import Light, light_on
 from steelyard.parts.skin import OPPOSITE, Skin
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.points.spacing import nearest
