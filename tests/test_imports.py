@@ -67,6 +67,7 @@ FILE_CALLS = {
     "load", "save", "savez", "savez_compressed", "loadtxt", "savetxt", "genfromtxt", "fromfile", "tofile",
 }  # fmt: skip
 VERB = ("identify", "api")  # the package `identify` is also the verb `sy.identify(log)`, which it hands on
+SLOW = ("scipy.signal", "scipy.stats")  # to import: a third of the time that a short log takes to answer
 PLOTTING = {"matplotlib", "plotly", "viser", "webbrowser"}
 RAISABLE = {"AttributeError", "SystemExit", "StopIteration"}  # a lazy __getattr__ must raise the first
 
@@ -170,6 +171,17 @@ def test_no_printing_plotting_or_files_below_io() -> None:
         if isinstance(node, ast.Call) and called(node) in FILE_CALLS and not is_resource(node)
     ]
     offences += [f"{name} imports {full}" for name in lower for full in imported(name) if unit(full) in PLOTTING]
+    assert offences == []
+
+
+def test_no_answer_waits_for_a_slow_import() -> None:
+    offences = [
+        f"{name} imports {full}"
+        for name in modules()
+        if unit(name) not in {"bench", "simulate"}
+        for full in imported(name)
+        if full.startswith(SLOW)
+    ]
     assert offences == []
 
 

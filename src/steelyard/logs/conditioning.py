@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.logs.butterworth import there_and_back
 from steelyard.logs.clock import sampling_rate
 from steelyard.logs.curve import Curve
 
@@ -34,18 +33,16 @@ def signal(time: Array, values: Array, cutoff_hz: float | None = None) -> Curve:
 
 
 def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> Array:
-    """Return `values` (N, D), evenly sampled, through a zero-phase Butterworth low-pass.
+    """Return `values` (N, D), evenly sampled, through a zero-phase Butterworth low-pass of even order.
 
     Raises BadValue when the cut-off is not below half the rate.
     Source: "Cooperative Payload Estimation", IV-B (fourth-order Butterworth; run forwards and backwards
     here).
     """
-    from scipy.signal import sosfiltfilt
-
     if not 0 < cutoff_hz < rate_hz / 2:
         raise BadValue(f"cut-off must be between 0 and half the rate ({rate_hz / 2:.6g} Hz); got {cutoff_hz:.6g} Hz.")
     pad = min(len(values) - 1, int(3 * rate_hz / cutoff_hz))
-    return np.asarray(sosfiltfilt(_butterworth(order, cutoff_hz / rate_hz), values, axis=0, padlen=pad))
+    return there_and_back(values, cutoff_hz / rate_hz, order, pad)
 
 
 def lowpass_gain(frequency: Array, cutoff_hz: float) -> Array:
@@ -66,14 +63,6 @@ def taken_by_filter(frequency: Array, late: float | Array) -> Array:
     accelerations, which grows with f, lowers what seems to follow, too. Shapes broadcast.
     """
     return np.asarray(np.sqrt(1 + (2 * np.pi * frequency * late) ** 2) - 1)
-
-
-@lru_cache(maxsize=64)
-def _butterworth(order: int, cutoff: float) -> Array:
-    """Return the second-order sections of a low-pass at a cut-off given as a share of the rate."""
-    from scipy.signal import butter
-
-    return np.asarray(butter(order, 2 * cutoff, output="sos"))
 
 
 def noise_std(values: Array) -> Array:
