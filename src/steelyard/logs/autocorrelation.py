@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from itertools import takewhile
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 
 from steelyard.check import Array
 
@@ -22,6 +21,8 @@ FEW = 64
 
 def lagged_products(series: Array, lags: int) -> Array:
     """Return the sums (lags,) over rows and columns of a series (N, ..) of x_t x_{t + lag}, from lag 0 on."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
     flat = series.reshape(len(series), -1)
     # So many zeros that the end does not meet the beginning.
     size = next_fast_len(len(flat) + lags, real=True)
