@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.inertia.regressor import newton_euler
+from steelyard.inertia.regressor import motion_map, newton_euler
 from steelyard.logs.autocorrelation import correlation_time
 from steelyard.logs.delays import Clocks, Question, features, free_residual, turning
 from steelyard.logs.imu import Imu, Mounting, first_mount
@@ -16,7 +17,8 @@ from steelyard.logs.kinematics import Motion
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import regressors
 from steelyard.logs.noise import block_covariance, huber, robust_std
-from steelyard.spatial import Rotation, lever_acceleration
+from steelyard.spatial import Rotation, cross_matrix, lever_acceleration, lever_matrix
+from steelyard.spatial.screws import exp_pose
 
 _BLOCKS = 20
 _ROUNDS = 4
@@ -85,6 +87,19 @@ class _Layout:
         sought = dict(zip(question.unknown, (float(v) for v in theta[self.slices["delay"]]), strict=True))
         return {**question.known, **sought}
 
+    @cached_property
+    def scales(self) -> Array:
+        """Starting scales (k,): what free linear fits of the channels leave over, infinite for dead channels."""
+        motion, wrench, force = self.seen(self.start)
+        scales, sizes = robust_std(free_residual(wrench, features(motion, force))), wrench.std(0)
+        if force is not None and motion.gravity is not None:
+            steady = [np.ones((len(force), 1)), motion.gravity, *turning(motion)]
+            scales = np.append(scales, np.full(3, robust_std(free_residual(force, steady)).mean()))
+            sizes = np.append(sizes, np.full(3, force.std()))
+        scales = np.maximum(scales, _FINEST * sizes + 1e-12)
+        scales[:6][list(self.question.felt.dead)] = np.inf
+        return np.asarray(scales)
+
     def seen(self, theta: Array) -> tuple[Motion, Array, Array | None]:
         """Return motion, wrench (N, 6) in S and raw specific force (N, 3) by the delays in theta (U,)."""
         return self.question.seen(self.delays(theta))
@@ -122,8 +137,12 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
 
 def _residual(layout: _Layout, theta: Array) -> Array:
     """Return residuals (N, 6) of the wrench, or (N, 9) with those of the accelerometer."""
+    return _beside(layout, theta, *_felt(layout, theta))
+
+
+def _beside(layout: _Layout, theta: Array, felt: Array, extra: list[Array]) -> Array:
+    """Return the residuals for what `_felt` returns."""
     motion, wrench, _ = layout.seen(theta)
-    felt, extra = _felt(layout, theta)
     body, bias = theta[layout.slices["body"]], theta[layout.slices["wrench_bias"]]
     return np.concatenate([wrench - bias - newton_euler(body, felt, motion.omega, motion.alpha), *extra], 1)
 
@@ -146,23 +165,52 @@ def _felt(layout: _Layout, theta: Array) -> tuple[Array, list[Array]]:
 
 
 def _jacobian(layout: _Layout, theta: Array) -> tuple[Array, Array]:
-    """Return residuals (N, k) and their derivative (N, k, P), forward differences where it is not linear."""
+    """Return residuals (N, k) and their derivative (N, k, P): forward differences over delays, closed forms else."""
     motion, wrench, _ = layout.seen(theta)
-    log = MotionLog(wrench, -_felt(layout, theta)[0], np.zeros_like(motion.omega), motion.omega, motion.alpha)
-    base = _residual(layout, theta)
+    felt, extra = _felt(layout, theta)
+    log = MotionLog(wrench, -felt, np.zeros_like(motion.omega), motion.omega, motion.alpha)
+    base, body = _beside(layout, theta, felt, extra), theta[layout.slices["body"]]
     out = np.zeros((*base.shape, len(theta)))
     out[:, :6, layout.slices["body"]] = -regressors(log)
     out[:, :6, layout.slices["wrench_bias"]] = -np.eye(6)
-    for i in range(layout.slices["body"].start):
+    for i in range(*layout.slices["delay"].indices(len(theta))):
         moved = theta.copy()
         moved[i] += _STEP
         out[..., i] = (_residual(layout, moved) - base) / _STEP
+    for name, (own, beside) in _by_mount(layout, theta, base[:, 6:]).items():
+        out[:, :6, layout.slices[name]] = -motion_map(body)[:, 3:6] @ own
+        out[:, 6:, layout.slices[name]] = beside
     return base, out
+
+
+def _by_mount(layout: _Layout, theta: Array, extra: Array) -> dict[str, tuple[Array, Array]]:
+    """Return the derivatives of what `_felt` returns by each block of the mount, (N, 3, k) each.
+
+    extra  (N, 3) what the accelerometer shows, (N, 0) where there is no gravity to show it against
+    """
+    motion, _, raw = layout.seen(theta)
+    if layout.question.imu is None or raw is None:
+        return {}
+    mount = layout.mounting(theta, layout.question.imu)
+    lever, turned = lever_matrix(motion.omega, motion.alpha), mount.rotation.apply(raw - mount.bias)
+    own = {"position": -lever, "scale": turned[..., None]}
+    own["bias"] = np.broadcast_to(-mount.scale * mount.rotation.matrix, lever.shape)
+    if "rotation" in layout.slices:
+        # Which way R turns as the rotation vector grows along each axis: where screws of one turn and unit shifts lead.
+        vector = theta[layout.slices["rotation"]]
+        turns = exp_pose(np.column_stack([np.tile(vector, (3, 1)), np.eye(3)])).position.T
+        own["rotation"] = -mount.scale * cross_matrix(turned) @ turns
+    shown = slice(0, extra.shape[1])
+    out = {name: (by, by[:, shown] / mount.scale) for name, by in own.items() if name in layout.slices}
+    out["scale"] = own["scale"], (own["scale"][:, shown] - extra[..., None]) / mount.scale
+    if "centre" in layout.slices:
+        out["centre"] = np.zeros_like(lever), -lever[:, shown] / mount.scale
+    return out
 
 
 def _rounds(layout: _Layout) -> tuple[Array, Array]:
     """Return the fit and its row weights: scales from the residuals, far rows first counted less, then let go."""
-    theta, sigma = layout.start.copy(), _first_scales(layout)
+    theta, sigma = layout.start.copy(), layout.scales
     weights = np.zeros((0, 0))
     for k in range(_ROUNDS):
         theta, weights, sigma = _descend(layout, theta, sigma, power=1 if k < _ROUNDS // 2 else 2)
@@ -178,8 +226,7 @@ def _mount_by_gravity(layout: _Layout) -> _Layout:
     if "rotation" not in layout.slices or layout.seen(layout.start)[0].gravity is None:
         return layout
     alone = layout.held("delay")
-    sigma = _first_scales(layout)
-    sigma[:6] = np.inf
+    sigma = np.concatenate([np.full(6, np.inf), layout.scales[6:]])
     theta, weights, _ = _descend(alone, layout.start, sigma)
     std = _block_std(alone, theta, weights)
     start, width = layout.start.copy(), layout.width.copy()
@@ -194,43 +241,26 @@ def _descend(layout: _Layout, theta: Array, sigma: Array, power: int = 1) -> tup
     pull = 1 / layout.width**2
     for _ in range(_STEPS):
         r, J = _jacobian(layout, theta)
-        H, scores = _normal(J, _weights(r, sigma, power), r, pull)
-        step = -np.linalg.solve(H, scores.sum(0) + pull * (theta - layout.start))
+        weights = _weights(r, sigma, power)
+        H = _normal(J, weights, pull)
+        scores = (weights * r).ravel() @ J.reshape(-1, J.shape[-1])
+        step = -np.linalg.solve(H, scores + pull * (theta - layout.start))
         biggest = float(np.abs(step[layout.slices["delay"]]).max(initial=0.0))
         step = step * min(1.0, _LONGEST_STEP / max(biggest, 1e-12))
         theta = theta + step
         if np.abs(step * np.sqrt(np.diag(H))).max() < 0.01:
             break
     r = _residual(layout, theta)
-    least = _first_scales(layout)
-    seen = np.clip(robust_std(r), 0.3 * least, 3 * least)
+    seen = np.clip(robust_std(r), 0.3 * layout.scales, 3 * layout.scales)
     seen[6:] *= np.sqrt(correlation_time(r[:, 6:], _LONGEST_MEMORY * len(r)))
     seen[:6] = np.where(np.isfinite(sigma[:6]), seen[:6], np.inf)
     return theta, _weights(r, seen, power), seen
 
 
-def _normal(J: Array, weights: Array, r: Array, pull: Array) -> tuple[Array, Array]:
-    """Return the normal matrix (P, P) with its prior and the scores (N, P) of the rows."""
-    weighted = J * weights[..., None]
-    flat = J.reshape(-1, J.shape[-1])
-    H = weighted.reshape(flat.shape).T @ flat + np.diag(pull)
-    return H, np.asarray((weighted * r[..., None]).sum(1))
-
-
-def _first_scales(layout: _Layout) -> Array:
-    """Return starting scales (k,): what free linear fits of the channels leave over, infinite for dead channels."""
-    motion, wrench, force = layout.seen(layout.start)
-    residual = free_residual(wrench, features(motion, force))
-    scales = robust_std(residual)
-    if force is not None and motion.gravity is not None:
-        steady = [np.ones((len(force), 1)), motion.gravity, *turning(motion)]
-        scales = np.append(scales, np.full(3, robust_std(free_residual(force, steady)).mean()))
-    sizes = wrench.std(0)
-    if len(scales) > 6 and force is not None:
-        sizes = np.append(sizes, np.full(3, force.std()))
-    scales = np.maximum(scales, _FINEST * sizes + 1e-12)
-    scales[:6][list(layout.question.felt.dead)] = np.inf
-    return np.asarray(scales)
+def _normal(J: Array, weights: Array, pull: Array) -> Array:
+    """Return the normal matrix (P, P) with its prior."""
+    scaled = (J * np.sqrt(weights)[..., None]).reshape(-1, J.shape[-1])
+    return np.asarray(scaled.T @ scaled + np.diag(pull))
 
 
 def _weights(residual: Array, sigma: Array, power: int) -> Array:
@@ -250,5 +280,5 @@ def _block_std(layout: _Layout, theta: Array, weights: Array) -> Array:
     """Return standard deviations (P,) by the sandwich over time blocks, which sees correlated residuals."""
     r, J = _jacobian(layout, theta)
     prior = 1 / layout.width**2
-    H, scores = _normal(J, weights, r, prior)
-    return np.sqrt(np.maximum(np.diag(block_covariance(H, scores, prior, _BLOCKS)), 0))
+    scores = np.einsum("nk,nkp->np", weights * r, J)
+    return np.sqrt(np.maximum(np.diag(block_covariance(_normal(J, weights, prior), scores, prior, _BLOCKS)), 0))
