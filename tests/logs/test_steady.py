@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_lsq_spline
 
 from steelyard.check import Array
 from steelyard.logs.recording import Recording, Stream
-from steelyard.logs.steady import with_steady_stamps
+from steelyard.logs.steady import _broken_line, with_steady_stamps
 from steelyard.spatial import Rotation
 
 STEP = 0.008
@@ -83,3 +84,12 @@ def test_a_slow_rate_is_evened_as_well() -> None:
     assert time is not None
     assert len(notes) == 1
     assert np.abs(time - 10.0 * np.arange(120)).max() < 0.1
+
+
+def test_the_broken_line_is_the_nearest_one() -> None:
+    rng = np.random.default_rng(1)
+    x = np.delete(np.arange(900.0), np.arange(300, 350))
+    y = 5.0 + 0.002 * x + 1e-4 * rng.normal(size=len(x))
+    knees = x[[0, 200, 500, len(x) - 1]]
+    expected = make_lsq_spline(x, y, np.concatenate([knees[:1], knees, knees[-1:]]), k=1)(x)
+    np.testing.assert_allclose(_broken_line(x, y, knees), expected, rtol=0, atol=1e-12)

@@ -236,3 +236,10 @@ def test_bad_input_is_named(make, text: str) -> None:
     with pytest.raises(BadValue) as error:
         make()
     assert str(error.value) == text
+
+
+def test_the_rotation_nearest_to_a_rotation_is_itself_and_none_is_a_reflection() -> None:
+    turns = Rotation.exp(np.random.default_rng(3).normal(size=(50, 3)))
+    assert np.array_equal(Rotation.nearest(turns.matrix).matrix, turns.matrix)
+    mirrored = turns.matrix * [1.0, 1.0, -0.5]
+    assert np.allclose(np.linalg.det(Rotation.nearest(mirrored).matrix), 1.0)

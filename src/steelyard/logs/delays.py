@@ -122,11 +122,11 @@ def _scan_cost(question: Question, delays: Mapping[str, float], name: str) -> fl
     motion, wrench, force = question.seen(delays)
     own = force is not None and question.imu is not None and name == question.imu.name
     chosen = [np.ones((len(force), 1)), force] if own and force is not None else features(motion, None)
-    cost = _log_share(wrench[:, ~np.array(question.felt.dead)], chosen)
+    values = wrench[:, ~np.array(question.felt.dead)]
     if force is not None and not own and motion.gravity is not None:
         # The accelerometer feels gravity turn as well, and no hand on the object disturbs it.
-        cost += _log_share(force, chosen)
-    return cost
+        values = np.concatenate([values, force], 1)
+    return _log_share(values, chosen)
 
 
 def _log_share(values: Array, chosen: list[Array]) -> float:

@@ -121,8 +121,6 @@ def _counts(time: Array) -> list[Integers]:
 
 def _even(time: Array, index: Integers) -> Array:
     """Return stamps (N,) [s] as broken lines of the count (N,), a line for each stretch between gaps."""
-    from scipy.interpolate import make_lsq_spline
-
     even = time.copy()
     step = median_step(time)
     for rows in np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) > _GAP * step) + 1):
@@ -131,8 +129,21 @@ def _even(time: Array, index: Integers) -> Array:
         x, pieces = index[rows].astype(float), int((time[rows[-1]] - time[rows[0]]) / _STEADY_S)
         pieces = max(min(pieces, len(rows) // _FEWEST), 1)
         knees = x[np.linspace(0, len(x) - 1, pieces + 1).astype(np.int64)]
-        even[rows] = make_lsq_spline(x, time[rows], np.concatenate([knees[:1], knees, knees[-1:]]), k=1)(x)
+        even[rows] = _broken_line(x, time[rows], knees)
     return even
+
+
+def _broken_line(x: Array, y: Array, knees: Array) -> Array:
+    """Return the values at x (N,) of the broken line with these `knees` (K,) that is nearest to y (N,)."""
+    piece = np.clip(np.searchsorted(knees, x, "right") - 1, 0, len(knees) - 2)
+    share, start, count = (x - knees[piece]) / np.diff(knees)[piece], y[0], len(knees)
+    normal, right = np.zeros((count, count)), np.zeros(count)
+    for at, weight in ((piece, 1 - share), (piece + 1, share)):
+        right += np.bincount(at, weight * (y - start), count)
+        normal += np.diag(np.bincount(at, weight**2, count))
+    beside = np.bincount(piece, share * (1 - share), count)[:-1]
+    heights = np.linalg.solve(normal + np.diag(beside, 1) + np.diag(beside, -1), right)
+    return np.asarray(start + np.interp(x, knees, heights))
 
 
 def _roughnesses(time: Array, stream: Stream, beside_noise: bool = False) -> Array:

@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.spatial.vectors import cross_matrix
+from steelyard.spatial.vectors import cross, cross_matrix
 
 _SMALL_SINE = 1e-6  # below it 2 asin(s)/s is 2 to within 1e-12
 _ZERO_NORM = 1e-12  # quaternions this short carry no direction
+_EXACT = 1e-14  # what is a rotation to the last digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,10 @@ class Rotation:
 
         Raises BadValue where no single rotation is nearest (rank one or zero, as in an empty row).
         """
-        u, s, vt = np.linalg.svd(check.matrices("matrix", matrix))
+        given = check.matrices("matrix", matrix)
+        if _is_rotation(given):
+            return cls.trusted(given)
+        u, s, vt = np.linalg.svd(given)
         sign = np.linalg.det(u @ vt)
         loose = s[..., 1] + sign * s[..., 2] <= _ZERO_NORM * s[..., 0]
         if loose.any():
@@ -189,6 +193,13 @@ class Rotation:
     def batch(self) -> tuple[int, ...]:
         """The batch shape."""
         return self.matrix.shape[:-2]
+
+
+def _is_rotation(matrix: Array) -> bool:
+    """Tell whether matrices (..., 3, 3) are rotations all, to the last digits: then a decomposition adds nothing."""
+    x, y, z = np.moveaxis(matrix, -1, 0)
+    square = np.swapaxes(matrix, -1, -2) @ matrix
+    return bool((np.abs(square - np.eye(3)) < _EXACT).all() and (np.abs(cross(x, y) - z) < _EXACT).all())
 
 
 def _quaternion_products(m: Array, squares: Array) -> Array:
