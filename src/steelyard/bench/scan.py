@@ -111,7 +111,7 @@ def _shape(scanned: Scanned) -> tuple[Scan, Shape, dict[str, float]]:
     """Return the fused views, the solid in parts, and the CPU time [s] of every stage."""
     scan = fuse(scanned.views)
     marks = [time.thread_time()]
-    solid = carved(enclose(scan.cloud), scan.space)
+    solid = carved(enclose(scan.cloud, one=True), scan.space)
     marks.append(time.thread_time())
     shape = Shape(solid, segment(solid.cloud, solid), scan)
     marks.append(time.thread_time())

@@ -58,7 +58,9 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
         if progress:
             progress(k + 1, len(names))
     table = _table(folder / "table.json") if (folder / "table.json").exists() else None
-    return in_file(folder, lambda: Views(depth, rgb, intrinsics, X_WC, float(camera["depth_unit_m"]), table))
+    return in_file(
+        folder, lambda: Views(depth, rgb, intrinsics, X_WC, float(camera["depth_unit_m"]), table, tuple(names))
+    )
 
 
 def _object(path: Path, what: str, keys: tuple[str, ...]) -> dict[str, Any]:

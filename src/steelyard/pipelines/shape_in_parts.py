@@ -125,7 +125,7 @@ def shape_of(
 def kept(scan: Scan) -> Cloud:
     """Return the cloud of a scan with what its views know beside it, so that a file of it answers as the views do."""
     try:
-        space = carving.kept(enclose(scan.cloud), scan.space)
+        space = carving.kept(enclose(scan.cloud, one=True), scan.space)
     except (BadValue, CannotAnswer):
         space = KeptSpace(scan.space.unseen, scan.space.unsure_m3)
     return replace(scan.cloud, kept=Kept(scan.findings, space, scan.place_std))
@@ -133,7 +133,7 @@ def kept(scan: Scan) -> Cloud:
 
 def _solid(cloud: Cloud, scan: Scan | Kept | None) -> tuple[Solid, tuple[str, ...]]:
     """Return the solid of a cloud, carved by what its views saw where that is known, and what was not used."""
-    solid = enclose(cloud)
+    solid = enclose(cloud, one=scan is not None)
     match scan:
         case Scan():
             return carving.carved(solid, scan.space), ()

@@ -22,12 +22,13 @@ from steelyard.shape.scans.hanging import hanging
 from steelyard.shape.scans.lens_error import lens_by_table
 from steelyard.shape.scans.patches import surface_of, surfels
 from steelyard.shape.scans.placement import Placement, moved_m, placement
-from steelyard.shape.scans.region import followed, lost_share
+from steelyard.shape.scans.region import Region, bare_share, followed, lost_share
 from steelyard.shape.scans.registration import Seen, agreed, left_open
 from steelyard.shape.scans.scan_colours import colours_of
 from steelyard.shape.scans.scan_findings import TABLE_OFF, Level, Surface, few_seen, findings_of
-from steelyard.shape.scans.scene import Scene, scene_of
+from steelyard.shape.scans.scene import LEAST_VIEWS, Scene, scene_of
 from steelyard.shape.scans.stand import put_on_stand
+from steelyard.shape.scans.strangers import left_out, strangers
 from steelyard.shape.scans.underside import DOWNWARD, Underside, closed_below
 from steelyard.shape.scans.uneven import uneven
 from steelyard.shape.scans.view_mistakes import likely_mistake
@@ -38,6 +39,8 @@ from steelyard.spatial import Pose, Rotation
 POINTS = 3000  # of the cloud, about
 _CELLS = 8000  # of the grid under the object, about
 _OFF_TABLE = 4.0  # times the depth noise: what is lower may not be told from the table
+_LEVEL = 0.9  # cosine of the normals of a table with the vertical
+_TABLE = 0.45  # of the brim around an object: less is covered by one of its own faces
 _STILL = 1e-9  # move of a camera that is none [m]
 
 
@@ -83,13 +86,18 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
 
     Raises CannotAnswer where no table or no object on it is found.
     """
+    views = views if views.names else replace(views, names=tuple(map(str, range(len(views)))))
     clock, mistake = _Clock(), cache(lambda: likely_mistake(views))
     scene = scene_of(views)
     try:
         scene, level, off = _read_right(scene, _levelled(scene, mistake))
         said, unsure = put_on_stand(scene)
         clock.lap("table")
-        found = _surface(scene, points, off, clock)
+        first = Seen.by(scene)
+        if (wrong := strangers(scene, first)).any():
+            return _without(views, scene.views.chosen(wrong).names, points)
+        clock.lap("object")
+        found = _surface(scene, first, points, off, clock)
     except CannotAnswer as error:
         raise CannotAnswer(" ".join(filter(None, (str(error), mistake())))) from None
     xyz, normal, seen, spacing, bottom = _closed(scene, found.xyz, found.normal, points)
@@ -113,6 +121,12 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
         disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,
         space=SeenSpace(_empty(scene, bottom), _guessed(scene), 1 - seen / len(cloud), unsure_m3),
     )  # fmt: skip
+
+
+def _without(views: Views, wrong: tuple[str, ...], points: int) -> Scan:
+    """Return the scan of `views` without those of the names `wrong`, as if they had never been taken."""
+    scan = fuse(views.chosen(~np.isin(views.names, wrong)), points)
+    return replace(scan, findings=(left_out(wrong), *scan.findings))
 
 
 def _placed(scene: Scene, middle: Array) -> Placement:
@@ -143,14 +157,13 @@ def _read_right(scene: Scene, level: Level) -> tuple[Scene, Level, float]:
     return scene, replace(level, lens=None), level.off
 
 
-def _surface(scene: Scene, points: int, off: float, clock: _Clock) -> Surface:
-    seen = Seen.by(scene)
-    clock.lap("object")
-    seen = agreed(scene, seen, off)
+def _surface(scene: Scene, first: Seen, points: int, off: float, clock: _Clock) -> Surface:
+    seen = agreed(scene, first, off)
     given, poses = scene.given, Pose(Rotation.nearest(scene.R), scene.p)
     clock.lap("registration")
     region = followed(scene, seen.region)
     patches = seen.patches if region is seen.region else surfels(scene, region)
+    _require_table(scene, patches, region)
     xyz, normal = surface_of(scene, patches, region, points)
     still = np.abs(poses.position - given.position).max() <= _STILL
     shift = None if still else moved_m(given, poses, xyz, normal)
@@ -158,6 +171,20 @@ def _surface(scene: Scene, points: int, off: float, clock: _Clock) -> Surface:
     by_poses = left_open(scene, seen, xyz, normal)
     clock.lap("surface")
     return Surface(xyz, normal, region.others, seen.spread, shift, lost, by_poses)
+
+
+def _require_table(scene: Scene, patches: Array, region: Region) -> None:
+    """Raise CannotAnswer where the plane that was found goes on beside too little of the object to be its table.
+
+    Of few views the object may hide the table behind it.
+    """
+    level = (patches[:, 5] > _LEVEL) & (np.abs(patches[:, 2]) < _OFF_TABLE * scene.sigma)
+    asked = scene.stated is None and scene.enough == LEAST_VIEWS
+    if asked and bare_share(patches[level, :3], region) < _TABLE:
+        raise CannotAnswer(
+            "no table was found: the plane that most measured points lie on does not go on around the object, and may "
+            "be a face of it. Move the camera so that more of the table is seen, or give table.json."
+        )
 
 
 class _Clock:

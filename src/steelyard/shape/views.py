@@ -94,6 +94,7 @@ class Views:
     X_WC        poses (V,) of the camera (optical: x right, y down, z forward) in W
     depth_unit  one step of `depth` [m]
     table       the plane the object lies on, None where it is to be found
+    names       of the views, () where they have none
     """
 
     depth: Depths
@@ -102,6 +103,7 @@ class Views:
     X_WC: Pose
     depth_unit: float = 0.001
     table: TablePlane | None = None
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         size = (self.intrinsics.height, self.intrinsics.width)
@@ -119,6 +121,8 @@ class Views:
             if rgb.shape != (*depth.shape, 3) or rgb.dtype != np.uint8:
                 raise BadValue(f"colour images must be uint8 {(*depth.shape, 3)}; got {rgb.dtype} {rgb.shape}.")
             object.__setattr__(self, "rgb", rgb)
+        if self.names and len(self.names) != len(depth):
+            raise BadValue(f"{len(depth)} views need as many names; got {len(self.names)}.")
         _require_depth(depth, self.depth_unit)
 
     def __len__(self) -> int:
@@ -127,7 +131,8 @@ class Views:
     def chosen(self, rows: Sequence[int] | Any) -> Views:
         """Return some of the views, numbers or a mask."""
         rgb = None if self.rgb is None else self.rgb[rows]
-        return replace(self, depth=self.depth[rows], rgb=rgb, X_WC=self.X_WC[rows])
+        names = tuple(np.array(self.names)[rows].tolist()) if self.names else ()
+        return replace(self, depth=self.depth[rows], rgb=rgb, X_WC=self.X_WC[rows], names=names)
 
     def posed(self, X_WC: Pose) -> Views:
         """Return the same images at other poses."""

@@ -35,19 +35,20 @@ _TORN, _MENDED = 0.004, 0.8
 _PATCHES = 0.05  # of the points: fewer that change sides are walls and gaps too narrow for neighbours, no patches
 
 
-def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
+def enclose(cloud: Cloud, points: int = POINTS, one: bool = False) -> Solid:
     """Return the closed volume behind the points of a surface, with or without normals; nothing is thickened.
 
     points  more than so many are thinned
+    one     whether all are known to be of one object, as views know it; else the largest piece stays of those far apart
 
     Walls down to about half the spacing keep their thickness; where they could not be told from gaps the finding
     `thin-thickened` says so. Raises BadValue where the points enclose nothing.
     """
-    made = _enclosed_by(cloud, points)
-    return _of_fewer(cloud, min(points, len(cloud)), made) if cloud.normals is None else made
+    made = _enclosed_by(cloud, points, one)
+    return _of_fewer(cloud, min(points, len(cloud)), made, one) if cloud.normals is None else made
 
 
-def _of_fewer(cloud: Cloud, points: int, made: Solid) -> Solid:
+def _of_fewer(cloud: Cloud, points: int, made: Solid, one: bool) -> Solid:
     """Return the solid of fewer points where one of noisy points is in doubt; as it was made where that is not clear.
 
     Noise as large as the spacing makes an orientation collapse. Fewer points lie farther apart, and each is the mean of
@@ -56,7 +57,7 @@ def _of_fewer(cloud: Cloud, points: int, made: Solid) -> Solid:
     if not _has(made, "thin-thickened"):
         return made
     for most in (points // share for share in _FEWER if points >= share * _LEAST_OF_FEWER):
-        used = working_cloud(cloud, most)
+        used = working_cloud(cloud, most, one=one)
         try:
             coarse, doubt = _made(used) if used.noise else (made, np.inf)
         except BadValue:  # they enclose nothing
@@ -66,14 +67,14 @@ def _of_fewer(cloud: Cloud, points: int, made: Solid) -> Solid:
     return made
 
 
-def _enclosed_by(cloud: Cloud, points: int) -> Solid:
+def _enclosed_by(cloud: Cloud, points: int, one: bool) -> Solid:
     """Return the closed volume behind a cloud, of at most about so many points."""
-    used = working_cloud(cloud, points)
+    used = working_cloud(cloud, points, one=one)
     made, doubt = _made(used)
     if used.along or (doubt < (CLEAR if used.noise else BLURRED) and not (used.noise and _has(made, "surface-open"))):
         return made
     # Averaging clears a noisy cloud, but makes one sheet of two where noise is as large as the wall between is thin.
-    other = working_cloud(cloud, points, settle=not used.noise)
+    other = working_cloud(cloud, points, not used.noise, one)
     if not (used.noise or other.noise):
         return made
     try:

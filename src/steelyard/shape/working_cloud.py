@@ -45,17 +45,18 @@ class WorkingCloud(NamedTuple):
     voxel: float = 0.0
 
 
-def working_cloud(cloud: Cloud, most: int, settle: bool | None = None) -> WorkingCloud:
+def working_cloud(cloud: Cloud, most: int, settle: bool | None = None, one: bool = False) -> WorkingCloud:
     """Return the points to make a solid from, at most about `most`.
 
     settle  whether noise is averaged out; None where points enough for it must go, or normals tell of it
+    one     whether all points are known to be of one object: between its pieces lies surface that was not seen
 
     Millimetres become metres, repeated points one, strays go, and of several objects the largest stays. Raises
     BadValue where fewer than twenty points remain or all lie in a plane.
     """
     cloud, found = _in_metres(cloud)
     thin = _thinned(_without_repeats(cloud), most, settle)
-    cloud, last = _one_object(thin.cloud)
+    cloud, last = _one_object(thin.cloud, one)
     _require_solid(cloud.xyz)
     # What views gave stands on a table that was found and taken away.
     table = left_table(cloud.xyz, cloud.near.spacing) if cloud.seen is None else None
@@ -159,18 +160,18 @@ def _strays(some: int, of: int) -> Finding:
     return Finding("outliers", text, "Nothing to do if the scan has stray points.")
 
 
-def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
-    """Return the largest of the pieces that lie far apart, without strays."""
+def _one_object(cloud: Cloud, one: bool) -> tuple[Cloud, list[Finding]]:
+    """Return the largest of the pieces that lie far apart, all where they are known to be `one`; without strays."""
     if len(cloud) < LEAST:
         return cloud, []
     piece = _pieces(cloud.near)
     sizes = np.bincount(piece)
     stray = (sizes < LEAST)[piece]
     if 0 < stray.sum() < _STRAY * len(cloud):
-        rest, found = _one_object(cloud.chosen(~stray))
+        rest, found = _one_object(cloud.chosen(~stray), one)
         return rest, [_strays(int(stray.sum()), len(cloud)), *found]
     large = np.flatnonzero(sizes >= max(_PIECE * len(cloud), LEAST))
-    if len(sizes) == 1 or not len(large):
+    if one or len(sizes) == 1 or not len(large):
         return cloud, []
     main = int(np.argmax(sizes))
     gap = _gap(cloud.xyz[piece == main], cloud.xyz[piece != main])

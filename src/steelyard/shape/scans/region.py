@@ -169,6 +169,15 @@ def _held(scene: Scene, grid: Grid) -> tuple[Array, Array]:
     return fine[..., 0], fine[..., 1]
 
 
+def bare_share(table: Array, region: Region) -> float:
+    """Return the share of the brim around where the object stands that points (N, 3) of the table cover."""
+    brim = region.mask & ~ndimage.binary_dilation(ndimage.binary_fill_holes(region.stands), np.ones((3, 3)))
+    covered = np.zeros_like(brim)
+    covered[region.grid.cells_under(table)[0]] = True
+    covered = ndimage.binary_dilation(covered, np.ones((3, 3)))
+    return float((brim & covered).sum() / brim.sum()) if brim.any() else 1.0
+
+
 def lost_share(xyz: Array, region: Region) -> float:
     """Return the share of where the object stands that is far from all of its surface points (N, 3)."""
     covered = np.zeros_like(region.stands)

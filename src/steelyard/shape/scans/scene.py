@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.depth_images import Images, held, sampled, stride_of
-from steelyard.shape.scans.table_plane import leveller, looked_at, table_frame, table_of
+from steelyard.shape.scans.table_plane import leveller, looked_at, table_frame, table_of, table_over_floor
 from steelyard.shape.scans.view_mistakes import advice
 from steelyard.shape.scans.view_planes import table_noise
 from steelyard.shape.views import TablePlane, Views
@@ -113,12 +113,13 @@ def scene_of(views: Views) -> Scene:
     looks = looked_at(R, p)
     distance = float(np.median(np.linalg.norm(p - looks, axis=1)))
     try:
-        table = table_of(points[:, :3], p, distance, views.table)
+        if views.table is None:
+            stated, (table, step) = None, table_over_floor(points[:, :3], p, looks, distance)
+        else:
+            stated = table_of(points[:, :3], p, distance, views.table)
+            table, step = leveller(points[:, :3], p, distance, stated)
     except CannotAnswer as error:
         raise CannotAnswer(f"{error} {advice(views)}") from None
-    stated, step = None if views.table is None else table, np.inf
-    if stated is not None:
-        table, step = leveller(points[:, :3], p, distance, stated)
     X_WT = table_frame(table, looks)
     noise = table_noise(points, X_WT.inverse().apply(points[:, :3]), distance, views.depth_unit, len(views))
     X_TC = X_WT.inverse() @ views.X_WC

@@ -148,6 +148,20 @@ def settled(images: Images, xyz: Any, normal: Any, window: float, noise: float, 
 
 
 @numba.njit(cache=True, nogil=True)
+def said(images: Images, xyz: Any, normal: Any, window: float, noise: float) -> Any:
+    """Return of how many points (N, 3) each view measures the surface, and past how many it sees: (V, 2)."""
+    cameras = _laid_out(images)
+    work, at = _room(len(images.p))
+    out = np.zeros((len(at), 2))
+    for i in range(len(xyz)):
+        _looked(images, cameras, xyz[i], normal[i], window, noise, work, at)
+        for k in range(len(at)):
+            out[k, 0] += work[0, k] == _SURFACE
+            out[k, 1] += work[0, k] == _PAST
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
 def colours(
     rgb: Any, images: Images, xyz: Any, normal: Any, window: float, noise: float, clear: float, enough: int
 ) -> Any:

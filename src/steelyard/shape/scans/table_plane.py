@@ -18,6 +18,7 @@ _LEAST = 0.2  # share of the points that must lie on the table
 _LEAST_GIVEN = 0.08  # the same of a table that is known: a stand or a tray is small
 _SLICE, _FACE, _ON_FACE = 0.004, 0.75, 0.003  # of the distance, of the points in the slices beside it, of all points
 _PARALLEL = np.cos(np.radians(5.0))  # to a stand's face: the table under it
+_LOOKED_AT = 0.6  # of the distance: no object reaches so high over its table that cameras look there
 _ROUNDS = 8
 
 
@@ -54,16 +55,31 @@ def find_table(points: Array, cameras: Array, distance: float, start: TablePlane
     return plane
 
 
-def table_of(points: Array, cameras: Array, distance: float, given: TablePlane | None) -> TablePlane:
-    """Return the table; one that is given as its points have it, or, of a stand too small for that, as it is."""
+def table_of(points: Array, cameras: Array, distance: float, given: TablePlane) -> TablePlane:
+    """Return a table that was given as its points have it, or, of a stand too small for that, as it is."""
     try:
         return find_table(points, cameras, distance, given)
     except CannotAnswer:
-        if given is None or not _is_face(given.height(points), distance):
+        if not _is_face(given.height(points), distance):
             raise
         if find_table(points, cameras, distance).normal @ given.normal < _PARALLEL:
             raise
         return given
+
+
+def table_over_floor(points: Array, cameras: Array, looks: Array, distance: float) -> tuple[TablePlane, float]:
+    """Return the table near the point (3,) that the cameras look at, and how far a floor is under it [m], inf without.
+
+    Beside a small table the floor may show more than the table does, too low for anything on it to be looked at.
+    """
+    found = find_table(points, cameras, distance)
+    if found.height(looks) > _LOOKED_AT * distance:
+        with suppress(CannotAnswer):
+            near = np.linalg.norm(points - looks, axis=1) < _LOOKED_AT * distance
+            table = find_table(points[near], cameras, distance)
+            if table.normal @ found.normal > _PARALLEL:
+                return table, -float(table.height(found.offset * found.normal))
+    return found, np.inf
 
 
 def leveller(points: Array, cameras: Array, distance: float, stated: TablePlane) -> tuple[TablePlane, float]:
