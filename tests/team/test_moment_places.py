@@ -86,6 +86,14 @@ def test_sound_moments_are_left() -> None:
     assert "motion-mismatch" not in found.codes()
 
 
+def test_slow_noise_of_forces_is_no_place() -> None:
+    noise = TeamNoise(force_white_N=1.0, torque_white_Nm=0.1, pose_rad=3e-4, pose_m=2e-4, force_spectrum="2hz")
+    trial = simulate_team(TeamScene(noise, 4, "poses", frozenset(range(4)), motion_samples=3000, squeeze_N=2.0), 50075)
+    found = JointTeam().identify(trial.log)
+    assert not found.codes()
+    assert np.abs(off(found, trial)).max() < 3
+
+
 def test_the_report_draws_moments_as_they_were_taken() -> None:
     trial = team(2, 3)
     name = trial.log.names[1]
