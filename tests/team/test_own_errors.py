@@ -16,7 +16,10 @@ from steelyard.simulate.team import TeamTrial
 from steelyard.simulate.team_cases import TeamNoise
 from steelyard.spatial import Rotation
 from steelyard.team.estimate import TeamEstimate
+from steelyard.team import weighed
 from steelyard.team.joint import JointTeam
+from steelyard.team.payload import own_errors
+from steelyard.team.payload.wrench_columns import equations, evidence_of_each
 
 QUIET = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.3, torque_white_Nm=0.03)
 WRONG = {"common-gain-unseen", "sensor-turned", "wrench-unexplained"}
@@ -79,3 +82,25 @@ def test_sound_teams_are_left_as_they_are(seed: int, monkeypatch: pytest.MonkeyP
     before = JointTeam().identify(made.log)
     assert np.array_equal(found.parameters.vector, before.parameters.vector)
     assert np.array_equal(found.covariance, before.covariance)
+
+
+def test_evidence_of_all_at_once_is_that_of_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[Any] = []
+
+    def seen(groups: Any, fit: Any, fitted: Any, D: Array, C: Array) -> Any:
+        given.append((fit, D, C))
+        return groups, fit, None
+
+    monkeypatch.setattr(weighed, "with_own_errors", seen)
+    made = team(14, kinds=("still", "motion"))
+    JointTeam().identify(with_forces(made.log, 3, lambda force: 1.03 * force))
+    fit, D, C = given[-1]
+    nothing = np.zeros((4, own_errors.COLUMNS))
+    expected = own_errors._tried(fit, D, C, own_errors._ways(4), nothing)[0]
+    wide = equations(fit, D, own_errors._levers(D, 3))[1]
+    columns = np.arange(nothing.size).reshape(nothing.shape)
+    found = [evidence_of_each(wide, C, fit.scale, some, own_errors.USUAL) for some in (columns[:, :1], columns[:, 1:])]
+    against = np.log(len(nothing) * own_errors.NOTHING)
+    # But for the ridge that `Models.of` adds against rounding.
+    np.testing.assert_allclose(np.concatenate(found) - against, expected[:-1], atol=1e-3)
+    assert own_errors._most(fit, D, C, own_errors._ways(4)) == pytest.approx(expected.max(), abs=1e-3)

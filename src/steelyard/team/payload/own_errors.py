@@ -23,8 +23,8 @@ from steelyard.team.misread.forces import reread
 from steelyard.team.payload.bias_models import Models, ladder_of, shares
 from steelyard.team.payload.doubt import moved_by
 from steelyard.team.payload.fit import PayloadFit
-from steelyard.team.payload.model import Group
-from steelyard.team.payload.wrench_columns import along, equations
+from steelyard.team.payload.model import Group, Normal
+from steelyard.team.payload.wrench_columns import along, equations, evidence_of_each
 
 # How far gains [1], and turns [rad], are usually off where they are.
 USUAL = 0.1
@@ -100,9 +100,9 @@ def with_own_errors(
     D, C  as of `fit_payload`
     """
     nothing, ways, number = np.zeros((D.shape[1] // 6, COLUMNS)), _ways(D.shape[1] // 6), -1
-    evidence, means, _ = _tried(fit, D, C, ways, nothing)
-    if evidence.max() < ASKED:
+    if _most(fit, D, C, ways) < ASKED:
         return groups, fit, None
+    evidence, means, _ = _tried(fit, D, C, ways, nothing)
     for _ in range(TRIES):
         if number == (likeliest := int(np.argmax(evidence))):
             break
@@ -168,19 +168,36 @@ def _ways(robots: int) -> list[Array]:
     return [*(gains[:, i : i + 1] for i in range(robots)), *(turns[:, i] for i in range(robots)), apart]
 
 
+def _most(fit: PayloadFit, D: Array, C: Array, ways: Sequence[Array]) -> float:
+    """Return the largest evidence that `_tried` has of any of the ways (4 N, U), of each robot's for all at once."""
+    plain, wide = equations(fit, D, _levers(D, 3))
+    each = np.arange(len(ways[0])).reshape(-1, COLUMNS)
+    own = [evidence_of_each(wide, C, fit.scale, chosen, USUAL).max() for chosen in (each[:, :1], each[:, 1:])]
+    (last,), _ = _weighed(plain, wide, C, fit.scale, ways[-1:], np.zeros(each.shape))
+    return float(max(max(own) - np.log(len(each)), last) - np.log(NOTHING))
+
+
 def _tried(fit: PayloadFit, D: Array, C: Array, ways: Sequence[Array], at: Array) -> tuple[Array, list[Array], Array]:
     """Return the evidence (H,) against none of errors in ways (4 N, U), beside those `at` (N, 4) that were taken out,
     what each makes of [phi, u], and the covariance of u by the last.
     """
     plain, wide = equations(fit, D, _levers(D, 3))
-    ladder = ladder_of(1, False)
-    scales = [np.r_[fit.scale, np.full(way.shape[1], USUAL)] for way in ways]
-    models = [Models.of(along(wide, way, at, USUAL), C, ladder, s) for way, s in zip(ways, scales, strict=True)]
+    evidence, models = _weighed(plain, wide, C, fit.scale, ways, at)
     # One robot of all, or all: kinds of error are alike beforehand.
     against = np.log(NOTHING) + np.log(np.where(np.arange(len(ways)) < len(ways) - 1, len(at), 1))
-    evidence = np.array([one.evidence for one in models]) - Models.of(plain, C, ladder, fit.scale).evidence - against
     means = [one.mean() for one in models]
-    return evidence, means, models[-1].covariance_about(means[-1])[10:, 10:]
+    return evidence - against, means, models[-1].covariance_about(means[-1])[10:, 10:]
+
+
+def _weighed(
+    plain: Sequence[Normal], wide: Sequence[Normal], C: Array, scale: Array, ways: Sequence[Array], at: Array
+) -> tuple[Array, list[Models]]:
+    """Return the evidence (H,) of each way against none, by nothing but the rows, and its answers."""
+    ladder = ladder_of(1, False)
+    models = [
+        Models.of(along(wide, way, at, USUAL), C, ladder, np.r_[scale, np.full(way.shape[1], USUAL)]) for way in ways
+    ]
+    return np.array([one.evidence for one in models]) - Models.of(plain, C, ladder, scale).evidence, models
 
 
 def _levers(D: Array, axes: int) -> Array:
