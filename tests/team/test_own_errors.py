@@ -15,8 +15,8 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial
 from steelyard.simulate.team_cases import TeamNoise
 from steelyard.spatial import Rotation
-from steelyard.team.estimate import TeamEstimate
 from steelyard.team import weighed
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.payload import own_errors
 from steelyard.team.payload.wrench_columns import equations, evidence_of_each
