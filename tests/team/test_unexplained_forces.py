@@ -96,10 +96,7 @@ def askew(track: Track) -> Array:
 
 def test_a_factor_of_one_is_not_named() -> None:
     log = simulate_team(scene(), 3).log
-    turned = changed(log, log.names[1], askew)
-    assert "sensor-turned" in JointTeam().identify(turned).codes()
-    unasked = JointTeam(gains=False).identify(turned).findings
-    (finding,) = (one for one in unasked if one.code == "wrench-unexplained")
+    (finding,) = named(changed(log, log.names[1], askew))
     assert f"What '{log.names[1]}' says does not go with the others" in finding.message
 
 

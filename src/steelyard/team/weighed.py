@@ -29,7 +29,6 @@ from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.late_forces import with_timely_forces
 from steelyard.team.payload.model import Group, unit_bias, units_of_body
 from steelyard.team.payload.moment_places import with_moments_at_grasps
-from steelyard.team.payload.own_errors import with_own_errors
 from steelyard.team.payload.spectra import band_edges, gathered, motion_noise
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.yielding import Yields
@@ -119,20 +118,15 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     rows, alike, loaded = with_one_load(rows, begun, fitted, D, size, highest_hz)
     first, touched = untouched(rows, alike, fitted, size, highest_hz)
     groups, read, payload = first.groups, first.read, first.payload
-    left_so = bool(read) and not first.taken  # what is named and not put right is in the forces still
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
-    own = None
-    if known and with_gain and not left_so and not odd:  # a hand all along is no error of a sensor
-        groups, payload, own = with_own_errors(groups, payload, lambda some: fit_payload(some, D, C, size), D, C)
-    taken = own.taken_beside(first.taken, log.names) if own is not None else first.taken
     payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
-    payload = payload if own is None else own.allowed(payload)
     _require_one_clock(payload.chi2)
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
         _require_mass(payload)
         require_lift(float(payload.parameters[0]), "the forces")
     told = any(one.code in TOLD for one in (*seen.findings, *read))
     wrong = () if told else tuple(unexplained(payload, D, log.names, placed=not spread.blind.size))
+    left_so = bool(read) and not first.taken  # what is named and not put right is in the forces still
     if wrong or left_so:
         more = covariance_of_unexplained(payload, D, log.names, forces=left_so)
         payload = replace(payload, covariance=payload.covariance + more)
@@ -159,15 +153,14 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *loaded,
         *touched,
         *odd,
-        *(() if own is None else (own.finding(log.names),)),
-        *(gains(payload.gain, payload.gainless) if known and own is None else ()),
+        *(gains(payload.gain, payload.gainless) if known else ()),
         *wrong,
         *lost_directions(team.grasps, seen.down, motion.apart),
         *open_parameters(team.identified, team.evidence.rank),
     )
     said = (*unsettled(motion.fit.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
     said = said if motion.ORDER == 1 else (*said, *uncalibrated(seen.spread.recurring))
-    return replace(team, findings=found, notes=(*team.notes, *said), wrench_maps=taken)
+    return replace(team, findings=found, notes=(*team.notes, *said), wrench_maps=first.taken)
 
 
 def _with_forces_read(

@@ -15,7 +15,7 @@ from steelyard.check import Array
 from steelyard.logs.recording import INCH, POUND_FORCE, STANDARD_GRAVITY
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
-from steelyard.spatial import Rotation, signed_axes, signed_columns
+from steelyard.spatial import signed_axes, signed_columns
 
 # Units taken for newtons: force, and the torque that goes with it, in SI.
 _UNITS = {"kgf": (STANDARD_GRAVITY, STANDARD_GRAVITY), "lbf": (POUND_FORCE, POUND_FORCE * INCH), "kN": (1e3, 1e3)}
@@ -131,8 +131,6 @@ def _words(X: Array) -> str:
         said.append(f"times {size:.4g}")
     if np.allclose(axes, -np.eye(3)):
         said.append("with its sign turned")
-    elif not np.allclose(np.abs(axes), np.abs(axes).round()):
-        said.append(f"turned by {np.degrees(Rotation.nearest(axes).angle()):.2g} degrees")
     elif not np.allclose(axes, np.eye(3)):
         said.append(f"with axes ({', '.join(signed_columns(axes))})")
     return " ".join(said)

@@ -12,9 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.check import Array, Integers
-from steelyard.team.definite import inverses, logarithms
-from steelyard.team.payload.bias_models import BIAS
+from steelyard.check import Array
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.model import Group, Normal
 from steelyard.team.payload.spectra import NO_LEVERS, SEEN, Spectra, regressors
@@ -37,40 +35,6 @@ def along(wide: Sequence[Normal], ways: Array, at: Array, usual: float) -> list[
     out[0].H[u, u] += usual**-2.0
     out[0].g[u] -= ways.T @ at.ravel() / (ways**2).sum(0) * usual**-2.0
     return out
-
-
-def evidence_of_each(wide: Sequence[Normal], C: Array, scale: Array, chosen: Integers, usual: float) -> Array:
-    """Return the evidence (W,), as a logarithm, of errors `chosen` (W, U) of all N C against none of them.
-
-    For each row it is what `Models.of` has of the equations `along` it, less that without errors: biases and payload
-    are taken out once for all rows.
-    C  (6, 6) of a unit bias     scale (10,) units of phi
-    """
-    H, g = np.stack([n.H for n in wide]), np.stack([n.g for n in wide])
-    phi, bias, u = np.s_[:10], np.s_[-6:], 10 + chosen
-    narrow, told = inverses(np.square(BIAS)[:, None, None, None] * C)
-    inner, held = inverses(H[:, bias, bias] + narrow)
-    blind = H[:, phi, bias] @ inner
-    onto = inner @ H[:, bias, 10:-6]
-    taken = (inner @ g[:, bias, None])[..., 0]
-    body = np.outer(scale, scale) * (H[:, phi, phi].sum(0) - (blind @ H[:, bias, phi]).sum(1))
-    across = usual * scale[:, None, None] * (H[:, phi, 10:-6].sum(0) - (H[:, phi, bias] @ onto).sum(1))[..., chosen]
-    across = across.transpose(0, 2, 1, 3)
-    own = H[:, u[:, :, None], u[:, None, :]].sum(0)
-    own = own - np.einsum("rwub,lrbwv->lwuv", H[:, u, bias], onto[..., chosen]) + usual**-2.0 * np.eye(u.shape[1])
-    own, unit = usual**2 * own, np.eye(10)
-    right = scale * (g[:, phi].sum(0) - (H[:, phi, bias] @ taken[..., None])[..., 0].sum(1))
-    left = usual * (g[:, u].sum(0) - np.einsum("rwub,lrb->lwu", H[:, u, bias], taken))
-    seen, beside = inverses(body)[0], inverses(unit + body)[0]
-    chance = (g[:, bias] * taken).sum((1, 2)) + np.einsum("lp,lpq,lq->l", right, seen, right) - logarithms(unit + body)
-    chance -= (told + held).sum(1)
-    left = left - np.einsum("lwpu,lpq,lq->lwu", across, seen, right)
-    back = across.swapaxes(2, 3)
-    solved = inverses(own - back @ seen[:, None] @ across)[0]
-    size = inverses(np.eye(u.shape[1]) + own - back @ beside[:, None] @ across)[1]
-    gained = np.einsum("lwu,lwuv,lwv->lw", left, solved, left) - size
-    total = np.logaddexp.reduce(0.5 * (chance[:, None] + gained), axis=0)
-    return np.asarray(total - np.logaddexp.reduce(0.5 * chance))
 
 
 def equations(fit: PayloadFit, D: Array, levers: Array) -> tuple[list[Normal], list[Normal]]:
