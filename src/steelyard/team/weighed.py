@@ -29,6 +29,7 @@ from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.late_forces import with_timely_forces
 from steelyard.team.payload.model import Group, unit_bias, units_of_body
 from steelyard.team.payload.moment_places import with_moments_at_grasps
+from steelyard.team.payload.own_gain import own_gain
 from steelyard.team.payload.spectra import band_edges, gathered, motion_noise
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.yielding import Yields
@@ -101,16 +102,23 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         groups = _groups(rows, seen.path, highest_hz, motion.ORDER)
         groups = tuple(replace(group, sighted=known) for group in groups)
         groups, read, taken = _with_forces_read(groups, D, log.names) if known else (groups, (), {})
-        fit = fit_payload(groups, D, C, size, with_gain)
+        fit = again(groups)
         if known and (taken or not read):  # forces that are misread, and left so, tell no places
-            groups, fit, places = with_moments_at_grasps(
-                groups, fit, lambda some: fit_payload(some, D, C, size, with_gain), D, C, six_axis
-            )
-            if places is not None:
+            moved_groups, moved_fit, places = with_moments_at_grasps(groups, fit, again, D, C, six_axis)
+            if places is not None and not rather_a_gain(groups, fit):
+                groups, fit = moved_groups, moved_fit
                 moved = places.taken(log.names)
                 taken = {**taken, **{name: M @ taken.get(name, np.eye(6)) for name, M in moved.items()}}
                 read = (*read, places.finding(log.names))
         return Weighing(groups, _summing_given(D, log.names, taken), read, taken, fit)
+
+    def again(some: tuple[Group, ...]) -> PayloadFit:
+        return fit_payload(some, D, C, size, with_gain)
+
+    def rather_a_gain(groups: tuple[Group, ...], fit: PayloadFit) -> bool:
+        """Return whether one robot's gain leaves nothing for moments about other points to explain."""
+        one = own_gain(groups, fit, again, D)
+        return one is not None and with_moments_at_grasps(one.groups, one.fit, again, D, C, six_axis)[2] is None
 
     C = unit_bias(D, six_axis, size)
     standing, propped = unpropped(seen.rows, fitted, D, highest_hz)
@@ -119,6 +127,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     first, touched = untouched(rows, alike, fitted, size, highest_hz)
     groups, read, payload = first.groups, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
+    plain = payload
     payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
     _require_one_clock(payload.chi2)
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
@@ -130,6 +139,10 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     if wrong or left_so:
         more = covariance_of_unexplained(payload, D, log.names, forces=left_so)
         payload = replace(payload, covariance=payload.covariance + more)
+    asked = known and with_gain and not (told or wrong or left_so or odd)
+    own = own_gain(groups, plain, again, D) if asked else None
+    if own is not None:
+        payload = replace(payload, covariance=payload.covariance + own.more)
     if late is not None:
         payload = replace(payload, covariance=payload.covariance + late.unsure(payload, D))
     if seen.yields is not None:
@@ -153,8 +166,9 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *loaded,
         *touched,
         *odd,
-        *(gains(payload.gain, payload.gainless) if known else ()),
+        *(gains(payload.gain, payload.gainless) if known and own is None else ()),
         *wrong,
+        *(() if own is None else (own.finding(log.names),)),
         *lost_directions(team.grasps, seen.down, motion.apart),
         *open_parameters(team.identified, team.evidence.rank),
     )

@@ -166,7 +166,7 @@ def _equations(fit: PayloadFit, D: Array) -> tuple[list[Normal], list[Normal]]:
     """Return the normal equations of every recording without places and with those of all robots, in loud bands."""
     plain, wide = list[Normal](), list[Normal]()
     for whole, weights in zip(fit.groups, fit.weights, strict=True):
-        group, W = _loud(whole, weights)
+        group, W = loud(whole, weights)
         each = group.normals(D, W)
         plain += each
         force = 6 / D.shape[1] * group.wrench_noise[:, 3:].mean(1)
@@ -182,7 +182,7 @@ def _levers(D: Array) -> Array:
     return np.concatenate([np.zeros((blocks.shape[0], 3, 6, 3)), blocks[..., :3] @ cross_matrix(np.eye(3))], axis=3)
 
 
-def _loud(group: Group, W: Array) -> tuple[Group, Array]:
+def loud(group: Group, W: Array) -> tuple[Group, Array]:
     """Return the group with its weights (K, 6, 6) in the slowest band and those in which turns are no noise."""
     rows = np.sum([part.rows for part in group.parts], axis=0)
     turned = np.sum([np.einsum("kii->k", part.scatter[:, :3, :3]) for part in group.parts], axis=0)
