@@ -72,10 +72,10 @@ def test_too_few_tables_tell_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_array_equal(scene.R, R)
 
 
-def plate(size: tuple[float, float, float]) -> Scanned:
+def plate(size: tuple[float, float, float], count: int = 36, distance: float | None = None) -> Scanned:
     cube = manifold3d.Manifold.cube(np.array(size)).translate(np.array([-size[0] / 2, -size[1] / 2, 0])).to_mesh64()
     mesh = TriangleMesh(cube.vert_properties[:, :3], cube.tri_verts, np.zeros(len(cube.tri_verts)))
-    return scan_mesh(mesh, 0, count=36, X_WO=Pose.identity())
+    return scan_mesh(mesh, 0, count=count, X_WO=Pose.identity(), distance=distance)
 
 
 @pytest.mark.parametrize("size", [(0.2, 0.15, 0.01), (0.24, 0.17, 0.012)], ids=["wide", "wider-than-the-table-in-view"])
@@ -89,6 +89,12 @@ def test_a_wide_low_object_is_not_taken_for_the_table(size: tuple[float, float, 
     _, over, tilt = apart(scene, made.views.X_WC)
     assert over < 1e-4
     assert tilt < np.radians(0.05)
+
+
+@pytest.mark.parametrize("size", [(0.12, 0.08, 0.005), (0.12, 0.005, 0.08)], ids=["lying", "standing"])
+def test_depth_noise_does_not_thicken_a_plate(size: tuple[float, float, float]) -> None:
+    """Of 1 mm: what lies within it over the surface is not seen to be empty, and yet is not hidden."""
+    assert volume(fuse(plate(size, 24, 0.5).views)) == pytest.approx(np.prod(size), rel=0.05)
 
 
 def test_a_view_without_a_table_is_left_out_where_others_are_moved() -> None:

@@ -12,7 +12,7 @@ from steelyard.shape.known_space import SeenSpace
 from steelyard.shape.points.medians import middle_mean, quantile
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.depth_images import Images, pixel_of
-from steelyard.shape.scans.view_planes import table_planes
+from steelyard.shape.scans.view_planes import INCIDENCE, table_noise, table_planes
 from steelyard.shape.volume import enclose
 
 CAMERA = np.array([60.0, 60.0, 32.0, 24.0])
@@ -48,8 +48,18 @@ def test_how_many_views_saw_past_a_point_is_what_each_of_them_says(count: int) -
         for point in points
     ]
     for enough in (1, 3):
-        found = sight_lines.seen_past(Images(depth, UNIT, CAMERA, R, p), points, 0.0, NOISE, enough)
+        found = sight_lines.seen_past(Images(depth, UNIT, CAMERA, R, p), points, 0.0, NOISE, enough)[:, 0]
         assert np.array_equal(found, np.minimum(said, enough))
+
+
+def test_views_together_tell_on_which_side_of_a_surface_a_point_lies_within_its_noise() -> None:
+    rng = np.random.default_rng(3)
+    depth, R, p = looking_down(100, rng)
+    points = np.column_stack([rng.uniform(-0.1, -0.02, (200, 2)), rng.choice([-0.0005, 0.0005], 200)])
+    images = Images(depth, UNIT, CAMERA, R, p)
+    past, outer = sight_lines.seen_past(images, points, 0.0, NOISE, 3).T
+    assert (past < 3).all()
+    assert np.mean((outer > 0) == (points[:, 2] > 0)) > 0.97
 
 
 @pytest.mark.parametrize("count", [1, 7, 200])
@@ -100,6 +110,26 @@ def test_the_noise_of_every_view_is_told_about_its_own_plane() -> None:
     assert found[:, 0] == pytest.approx([0, 2, 3])  # the second has too few points
     assert found[:, 1:4] == pytest.approx(np.array([[0, 0.01, 0], [0.002, 0.01, 0], [0.003, 0.01, 0]]), abs=2e-3)
     assert found[:, 4] == pytest.approx([0.004, 0.008, 0.002], rel=0.2)
+
+
+def test_a_table_that_ends_within_reach_tells_its_noise_beside_what_lies_on_it() -> None:
+    rng = np.random.default_rng(0)
+    xy, view = rng.uniform(-0.1, 0.1, (4000, 2)), np.repeat(np.arange(4.0), 1000)
+    on = np.abs(xy) < [0.06, 0.045]
+    height = np.where(on.all(1), 0.006, 0.0) + 0.35**2 * 0.004 * rng.normal(size=4000)
+    xyz = np.column_stack([xy, height])
+    sampled = np.column_stack([xyz, np.full(4000, 0.35), view])
+    assert table_noise(sampled, xyz, 0.35, 1e-4, 4) == pytest.approx(0.004 / INCIDENCE, rel=0.15)
+
+
+def test_cells_before_a_surface_by_less_than_its_noise_stay_as_the_solid_has_them() -> None:
+    ball = np.random.default_rng(0).normal(size=(400, 3))
+    ball *= 0.05 / np.linalg.norm(ball, axis=1, keepdims=True)
+    ball[:, :2] *= 0.5 + 10 * np.abs(ball[:, 2:])  # with a waist
+    solid = enclose(Cloud(ball))
+    hidden, before = (carved(solid, SeenSpace(lambda points, v=v: np.full(len(points), v))) for v in (0.0, 0.2))
+    assert before.mesh.volume == pytest.approx(solid.mesh.volume)
+    assert hidden.mesh.volume > 1.05 * before.mesh.volume
 
 
 def test_carving_twice_by_the_same_views_changes_nothing_and_needs_the_complex() -> None:

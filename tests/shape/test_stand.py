@@ -9,6 +9,7 @@ import manifold3d
 import numpy as np
 import pytest
 
+from steelyard.errors import CannotAnswer
 from steelyard.pipelines.shape_in_parts import Shape, shape_of
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import Scan, fuse
@@ -89,6 +90,13 @@ def test_a_stand_that_fills_the_views_is_the_table(x: float, y: float, high: flo
     assert shape.solid.mesh.volume == pytest.approx(EDGE**3, rel=0.05)
     assert isinstance(shape.scan, Scan)
     assert shape.scan.table.offset == pytest.approx(high, abs=1e-3)
+
+
+@pytest.mark.parametrize("high", [0.025, 0.06])
+def test_the_plane_of_a_table_hidden_under_a_stand_is_said_to_be_the_wrong_one(high: float) -> None:
+    views = on_stand(0.40, 0.30, high)
+    with pytest.raises(CannotAnswer, match="Give the plane that the object itself stands on"):
+        fuse(replace(views, table=TablePlane(np.array([0, 0, 1.0]), 0.0)))
 
 
 @pytest.mark.parametrize(

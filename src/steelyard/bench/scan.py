@@ -136,7 +136,7 @@ def _unseen(scanned: Scanned, bounds: Any) -> float:
     R, p = views.X_WC.rotation.matrix.copy(), views.X_WC.position.copy()
     lens = views.intrinsics.vector
     images = Images(views.depth, views.depth_unit, lens, R, p)
-    past = seen_past(images, points, views.depth_unit, 0.0, 1)
+    past = seen_past(images, points, views.depth_unit, 0.0, 1)[:, 0]
     return float((past == 0).mean() * np.prod(bounds[1] - bounds[0]))
 
 

@@ -29,7 +29,8 @@ _GUESSED, _BEHIND = 0.12, 2.0
 def carved(solid: Solid, space: Space) -> Solid:
     """Return the solid with its cells decided anew where the views decide.
 
-    With the underside closed, all that no view saw to be empty is the object's; between, the solid's own verdict holds.
+    With the underside closed, all that no view saw to be empty is the object's; between, and before a surface by less
+    than its noise, the solid's own verdict holds: such cells filled every dip of noisy points up to the outermost.
     A surface that looked open is closed by that, and what closes it is a guess: `surface-open` where that is much of
     the skin. CannotAnswer where the views leave nothing.
     """

@@ -27,7 +27,8 @@ _PLACES = np.array([[0.25] * 4, *(0.15 + 0.4 * np.eye(4))])
 class SeenSpace:
     """The space around an object as its views answer for it.
 
-    empty      whether points (N, 3) are known to be outside the object
+    empty      how surely points (N, 3) lie outside the object (N,): 1 seen to be empty, 0 nothing says so, between
+               before a surface by less than its noise; a cell of such places is neither seen empty nor hidden
     guess      share of a skin, middles (N, 3) and outward areas (N, 3) of its triangles, on which no view measured a
                surface; of what stands clear of the table and does not face it. None: not asked
     unseen     share of the object's surface that nobody saw
@@ -40,9 +41,13 @@ class SeenSpace:
     unsure_m3: float = 0.0
 
     def emptied(self, cells: TetMesh) -> Array:
-        """Return the share (T,) of each cell that the views know to be outside, in fifths."""
+        """Return the share (T,) of each cell that the views know to be outside, in whole fifths."""
+        return self._fifths(cells) / len(_PLACES)
+
+    def _fifths(self, cells: TetMesh) -> Integers:
         asked = np.einsum("pk,tkd->ptd", _PLACES, cells.vertices[cells.tets])
-        return np.asarray(np.asarray(self.empty(asked.reshape(-1, 3)), float).reshape(len(_PLACES), -1).mean(0))
+        empty = np.asarray(self.empty(asked.reshape(-1, 3)), float).reshape(len(_PLACES), -1)
+        return np.asarray(np.rint(empty.sum(0)).astype(np.int64))
 
     def guessed(self, solid: TetMesh) -> float:
         """Return the share of the skin of a solid on which no view measured a surface."""
@@ -53,8 +58,7 @@ class SeenSpace:
 
     def kept(self, cells: TetMesh) -> KeptSpace:
         """Return what is to be kept of it with the cloud whose complex has these cells."""
-        fifths = np.rint(self.emptied(cells) * len(_PLACES)).astype(np.int64)
-        return KeptSpace(self.unseen, self.unsure_m3, fifths[_in_order(cells)])
+        return KeptSpace(self.unseen, self.unsure_m3, self._fifths(cells)[_in_order(cells)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -211,15 +210,15 @@ def _closed(scene: Scene, xyz: Array, normal: Array, points: int) -> tuple[Array
     return xyz[rows], normal[rows], int((rows < seen).sum()), radius, bottom
 
 
-def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
+def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Array]:
     back = scene.X_WT.inverse()
 
-    def empty(points: Array) -> Any:
+    def empty(points: Array) -> Array:
         at = back.apply(points)
-        found = np.asarray(bottom.below(at))
-        rows = np.flatnonzero(~found)
+        found = np.asarray(bottom.below(at), float)
+        rows = np.flatnonzero(found == 0)
         rows = rows[in_cubes(at[rows], 8 * scene.pixel)] if len(rows) else rows
-        found[rows] = scene.seen_empty(at[rows])
+        found[rows] = scene.emptiness(at[rows])
         return found
 
     return empty

@@ -97,10 +97,7 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     label, found = ndimage.label(ndimage.binary_opening(up, np.ones((2, 2))), np.ones((3, 3)))
     area = np.bincount(label[well], minlength=found + 1)[1:]
     if not area.any():
-        raise CannotAnswer(
-            "no object was found on the table: nothing stands out of it where the cameras look. "
-            "Lay it there; if it stands on a stand, give the plane of that in table.json."
-        )
+        raise CannotAnswer(_nothing(scene, level > 0.5 * cap))
     largest = int(np.argmax(area)) + 1
     label = _with_its_floor(label, largest, watched & ~up)
     area, whole = (np.bincount(cells, minlength=found + 1)[1:] for cells in (label[well], label.ravel()))
@@ -113,6 +110,19 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     mine &= ~stranger
     highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
     return Region(grid, mine, label == largest, highest, others, False)
+
+
+def _nothing(scene: Scene, covered: bool) -> str:
+    """Return what to say where nothing stands out; `covered` where most of what is seen lies over the table."""
+    if covered and scene.stated is not None:
+        return (
+            "no object was found: most of what lies where the cameras look is level, and above the plane in "
+            "table.json. Give the plane that the object itself stands on, as that of a stand, or leave table.json out."
+        )
+    return (
+        "no object was found on the table: nothing stands out of it where the cameras look. "
+        "Lay it there; if it stands on a stand, give the plane of that in table.json."
+    )
 
 
 def _with_its_floor(label: Any, largest: int, table: Any) -> Any:

@@ -19,6 +19,7 @@ from steelyard.spatial import Pose
 
 LEAST_VIEWS = 3  # that must agree before something is believed
 _SHOW = 4  # one view in so many sees a given place
+OUTER = 0.2  # of what a place seen to be empty says: one before a surface, within its noise
 WINDOW = 0.002  # how far from a settled point a measurement of it may lie, beside its noise [m]
 _SAMPLES = 30_000  # points that find the table
 
@@ -89,7 +90,16 @@ class Scene:
 
     def seen_empty(self, points: Array) -> Any:
         """Return past which of points (N, 3) enough views see."""
-        return sight_lines.seen_past(self.images, points, 0.0, self.noise, LEAST_VIEWS) >= self.enough
+        return self.emptiness(points) == 1
+
+    def emptiness(self, points: Array) -> Array:
+        """Return how surely points (N, 3) lie outside the object (N,): 1 where enough views see past them.
+
+        `OUTER` where most views have the surface that they measure there behind them; 0 where it is before them, and
+        where nothing is measured.
+        """
+        past, outer = sight_lines.seen_past(self.images, points, 0.0, self.noise, LEAST_VIEWS).T
+        return np.where(past >= self.enough, 1.0, np.where(outer > 0, OUTER, 0.0))
 
     def sights(self, points: Array) -> Array:
         """Return how many views see past each of points (N, 3), and how many measure something there: (N, 2)."""

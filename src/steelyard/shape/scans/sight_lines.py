@@ -199,16 +199,19 @@ def colours(
 
 @numba.njit(cache=True, nogil=True)
 def seen_past(images: Images, points: Any, margin: float, noise: float, enough: int) -> Any:
-    """Return how many views (N,), up to `enough`, measured something behind each point (N, 3): there it is empty.
+    """Return how many views, up to `enough`, measured something behind each point (N, 3): there it is empty. (N, 2)
 
     margin  by how much farther, beside 3 standard deviations of the depth noise [m]
+
+    Of where fewer than `enough` did, also by how many more views have the surface that they measure there, within that
+    noise, behind the point than before it: one view cannot tell on which side of it a point lies, but most can.
 
     Views that saw past the point before are asked first: that changes how soon there are enough and nothing else.
     """
     cameras = _laid_out(images)
     work, at = _room(len(images.p))
     last, known = np.empty(enough, np.int64), 0
-    beyond, out = work[6], np.zeros(len(points), np.int64)
+    beyond, out = work[6], np.zeros((len(points), 2), np.int64)
     for i in range(len(points)):
         again = known == enough
         for m in range(enough if again else 0):
@@ -216,17 +219,17 @@ def seen_past(images: Images, points: Any, margin: float, noise: float, enough: 
             if not again:
                 break
         if again:
-            out[i] = enough
+            out[i, 0] = enough
             continue
         _fetched(images, cameras, points[i], work, at)
-        known = _behind(work, images.unit, margin, noise)
+        known, out[i, 1] = _behind(work, images.unit, margin, noise)
         if known >= enough:
             known = 0
             for k in range(len(at)):
                 if known < enough and beyond[k] > 0:
                     last[known] = k
                     known += 1
-        out[i] = known
+        out[i, 0] = known
     return out
 
 
@@ -258,15 +261,19 @@ def _past_and_on(work: Any, unit: float, focal: float, noise: float) -> tuple[in
 
 
 @numba.njit(cache=True, nogil=True)
-def _behind(work: Any, unit: float, margin: float, noise: float) -> int:
-    """Return how many views measured something behind a point; mark those by 1, the others by 0."""
-    depth, measured, found = work[3], work[6], 0
+def _behind(work: Any, unit: float, margin: float, noise: float) -> tuple[int, int]:
+    """Return how many views measured something behind a point, marked by 1, the others by 0; and, within the noise, by
+    how many more something behind it than before it."""
+    depth, measured, found, outer = work[3], work[6], 0, 0
     for k in range(len(depth)):
         z = depth[k]
-        past = (z > 0) & (measured[k] * unit > z + margin + 3 * noise * z * z)
+        behind, error = measured[k] * unit - z, margin + 3 * noise * z * z
+        past = (z > 0) & (behind > error)
         measured[k] = 1.0 if past else 0.0
         found += past
-    return found
+        outer += ((z > 0) & (behind > 0)) ^ past
+        outer -= (z > 0) & (behind < 0) & (behind >= -error)
+    return found, outer
 
 
 @numba.njit(cache=True, nogil=True)

@@ -40,7 +40,8 @@ def find_table(points: Array, cameras: Array, distance: float, start: TablePlane
     least = _LEAST_GIVEN if start else _LEAST
     if (share := float((np.abs(height) < near).mean())) < least:
         raise CannotAnswer(
-            f"no table was found: {100 * share:.0f} % of the measured points lie on one plane below the cameras, "
+            f"no table was found: {100 * share:.0f} % of the measured points lie on "
+            f"{'the plane in table.json' if start else 'one plane below the cameras'}, "
             f"expected {100 * least:.0f} % or more."
         )
     on = np.abs(height) < near

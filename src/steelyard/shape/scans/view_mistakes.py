@@ -142,7 +142,10 @@ def advice(views: Views) -> str:
     """Return what to do about views that show no table."""
     given = _Given(views.depth_unit, views.intrinsics, views.X_WC)
     if views.table is not None and (share := table_share(views, given)) > _MOST:
-        return f"Without table.json {100 * share:.0f} % would: correct it, or leave it out."
+        return (
+            f"Without table.json {100 * share:.0f} % would lie on one plane: give the one that the object itself "
+            "stands on, as that of a stand, or leave it out."
+        )
     return likely_mistake(views) or _GENERAL
 
 

@@ -24,14 +24,17 @@ def table_noise(sampled: Array, xyz: Array, distance: float, unit: float, views:
     sampled, xyz  points as `table_planes` takes them      distance  of the table [m]      unit  of depth [m]
 
     A wide, low object is no noise: what lies around tells where it is clearly more even. A cloth has folds there too.
+    Of a table so small that it does not reach so far, the outer half lies around.
     """
-    found: list[float] = []
-    near = 0.03 * distance
-    for rows in (slice(None), np.hypot(xyz[:, 0], xyz[:, 1]) > _AROUND * distance):
-        planes = table_planes(sampled[rows], xyz[rows], near)
-        if len(planes) > 0.5 * views or not found:
-            found.append(noise_of(planes, unit, distance))
-    return found[-1] if found[-1] < _CLEARLY * found[0] else found[0]
+    near, away = 0.03 * distance, np.hypot(xyz[:, 0], xyz[:, 1])
+    whole, around = table_planes(sampled, xyz, near), np.empty(0)
+    for inner in (_AROUND * distance, np.median(away[np.abs(xyz[:, 2]) < near])):
+        if len(around) <= 0.5 * views:
+            around = table_planes(sampled[away > inner], xyz[away > inner], near)
+    found = noise_of(whole, unit, distance)
+    if len(around) > 0.5 * views and (even := noise_of(around, unit, distance)) < _CLEARLY * found:
+        return even
+    return found
 
 
 def noise_of(planes: Array, unit: float, distance: float) -> float:
