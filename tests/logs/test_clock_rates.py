@@ -41,7 +41,7 @@ def sound() -> Estimate:
     return identify(made(0.0, imu=False))
 
 
-@pytest.mark.parametrize("rate", [1e-4, -1e-4, 1e-3, 0.01, -0.01])
+@pytest.mark.parametrize("rate", [1e-4, 0.01, -0.01])
 def test_a_clock_that_runs_fast_costs_nothing(rate: float, sound: Estimate) -> None:
     found = identify(made(rate, imu=False))
     assert found.codes() == {"clock-unsteady"}

@@ -46,12 +46,14 @@ def with_noise_only(recording: Recording, quantity: str, axis: int) -> Recording
     return replace(recording, streams=tuple(deaf(s) if "force" in s.channels else s for s in recording.streams))
 
 
-@pytest.mark.parametrize("spoil", [with_dead, with_noise_only])
-@pytest.mark.parametrize(("quantity", "axis"), [("force", 0), ("force", 2), ("torque", 1)])
+@pytest.mark.parametrize(
+    ("spoil", "quantity", "axis"),
+    [(with_dead, "force", 0), (with_dead, "torque", 1), (with_noise_only, "force", 2), (with_noise_only, "torque", 1)],
+)
 def test_the_others_answer(
+    spoil: Callable[[Recording, str, int], Recording],
     quantity: str,
     axis: int,
-    spoil: Callable[[Recording, str, int], Recording],
     recording: Recording,
     whole: Estimate,
 ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -27,6 +28,12 @@ from steelyard.spatial import Rotation
 TIPS = [(0.0, 0.0, 0.03), (0.0, 0.05, 0.0), (0.02, -0.03, 0.1)]
 
 
+@cache
+def sound_answer() -> Estimate:
+    """Return the answer where positions are those of S."""
+    return identify(recorded("paper", 0))
+
+
 def off(found: Estimate) -> float:
     """Return how many standard deviations mass, centre of mass and inertia are off at most."""
     inertia = (found.parameters.inertia_com - BODY.inertia_com)[np.triu_indices(3)]
@@ -47,7 +54,7 @@ def test_the_tip_of_a_tool_is_told_and_the_answer_holds(tip: tuple[float, float,
 
 
 def test_positions_of_the_sensor_are_left_alone() -> None:
-    found = identify(recorded("paper", 0))
+    found = sound_answer()
     assert found.codes() == set()
     assert off(found) < 3.5
 
@@ -98,8 +105,7 @@ def test_the_point_told_is_the_one_that_rows_were_made_with(monkeypatch: pytest.
     np.testing.assert_array_equal(place.place, used[-1])
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-4])
-@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (1.0, 1.0, 0.3)])
+@pytest.mark.parametrize(("axis", "noise"), [((1.0, 0.0, 0.0), 0.0), ((1.0, 1.0, 0.3), 1e-4)])
 def test_turns_about_one_axis_tell_the_point_but_for_that_axis(axis: tuple[float, ...], noise: float) -> None:
     rng, time, g = np.random.default_rng(0), np.arange(0, 30, 0.01), np.array([0.0, 0.0, -9.81])
     along, tip, com = np.array(axis) / np.linalg.norm(axis), np.array([0.02, -0.03, 0.1]), np.array([0.02, 0.01, 0.05])
@@ -166,7 +172,7 @@ def test_a_point_where_a_unit_or_a_sign_puts_it_is_no_tip(torque: float, force: 
 
 
 def test_a_gain_of_the_forces_is_said_to_be_in_no_bar() -> None:
-    notes = [n for n in identify(recorded("paper", 0)).notes if "no gain of the sensor" in n]
+    notes = [n for n in sound_answer().notes if "no gain of the sensor" in n]
     moved = 0.01 * float(BODY.mass)
     assert notes == [
         f"error bars hold no gain of the sensor: forces 1 % too large would move the mass by {moved:.2g} kg, "

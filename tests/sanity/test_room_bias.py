@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -36,6 +37,12 @@ def biased(recording: Recording, bias: np.ndarray = BIAS) -> Recording:
     return replace(recording, streams=(replace(wrench, channels=channels), poses))
 
 
+@cache
+def answer(seed: int) -> Estimate:
+    """Return the answer of a recording with the bias BIAS."""
+    return sy.identify(biased(hammer.recording(seed).recording))
+
+
 def still(recording: Recording, rows: int = 14) -> Recording:
     """Return a table of still poses, each in a direction of its own, of the hammer with the bias BIAS."""
     rng = np.random.default_rng(5)
@@ -60,7 +67,7 @@ def said_to_pull(estimate: Estimate) -> list[str]:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_moving_log_is_answered_without_it(seed: int) -> None:
-    found = sy.identify(biased(hammer.recording(seed).recording))
+    found = answer(seed)
     assert np.abs(misses(found)).max() < 3
     assert found.std[0] < 0.1
     assert not {"contact", "base-tilted"} & found.codes()
@@ -97,7 +104,7 @@ def test_a_small_pull_is_said_with_what_its_like_along_gravity_would_do(seed: in
 
 
 def test_what_is_taken_out_is_not_said_to_pull_as_well() -> None:
-    assert not said_to_pull(sy.identify(biased(hammer.recording(0).recording)))
+    assert not said_to_pull(answer(0))
 
 
 def test_a_tilted_base_is_none() -> None:
@@ -125,9 +132,8 @@ def test_one_that_passes_for_a_tilt_at_a_glance_is_taken_out_all_the_same(seed: 
 
 
 def test_residuals_are_those_without_it() -> None:
-    recording = biased(hammer.recording(0).recording)
-    found = sy.identify(recording)
-    left = left_over(recording, found)[1]
+    found = answer(0)
+    left = left_over(biased(hammer.recording(0).recording), found)[1]
     assert left[:, 3:].std() < 1.2 * found.evidence.residual_force_N
 
 

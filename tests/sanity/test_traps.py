@@ -105,7 +105,7 @@ def test_positions_in_millimetres(kind: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("object_name", scenarios.object_names())
 def test_clean_logs_stay_clean(object_name: str, tmp_path: Path) -> None:
-    for seed, noise in ((10, 0.0), (11, 1.0), (12, 5.0)):
+    for seed, noise in ((10, 0.0), (12, 5.0)):
         recording = made(tmp_path, Kind(object_name, noise, seed))
         assert examine(recording)[1] == ()
         assert examine(delayed(recording, "rotation", 0.1))[1] == ()

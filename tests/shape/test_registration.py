@@ -44,10 +44,9 @@ def test_moves_of_a_ruler_along_itself_are_chance_unless_poses_are_known_to_be_w
     assert shown < 0.2 * scene.sigma
 
 
-@pytest.mark.parametrize("deg", [1.0, 2.0])
-def test_views_that_are_turned_about_the_object_are_turned_back(deg: float) -> None:
+def test_views_that_are_turned_about_the_object_are_turned_back() -> None:
     views = seen().views
-    up = np.random.default_rng(0).normal(size=(36, 1)) * np.array([0, 0, np.radians(deg)])
+    up = np.random.default_rng(0).normal(size=(36, 1)) * np.array([0, 0, np.radians(2.0)])
     about = np.array([*right().cloud.xyz.mean(0)[:2], 0.0])
     turn = Rotation.exp(up)
     turned = Pose(turn, about - turn.apply(about)) @ views.X_WC
@@ -58,8 +57,7 @@ def test_views_that_are_turned_about_the_object_are_turned_back(deg: float) -> N
 
 def test_a_low_object_is_found_from_where_what_stands_on_the_table_brings_the_views() -> None:
     """From where they were reported no fit finds it; the level of the table tells that they are far off."""
-    for mm, deg in ((4.0, 1.0), (6.0, 1.5)):
-        assert volume(fuse(wrong_by(seen("ruler").views, mm, deg))) == pytest.approx(right_volume("ruler"), rel=0.25)
+    assert volume(fuse(wrong_by(seen("ruler").views, 6.0, 1.5))) == pytest.approx(right_volume("ruler"), rel=0.25)
 
 
 def test_a_wrinkle_of_the_table_is_no_low_object() -> None:

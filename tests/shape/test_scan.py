@@ -14,7 +14,7 @@ from steelyard.shape.carving import carved
 from steelyard.shape.known_space import SeenSpace
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.points.thinning import spread
-from steelyard.shape.scan import fuse
+from steelyard.shape.scan import Scan, fuse
 from steelyard.shape.scans.region import _with_its_floor
 from steelyard.shape.scans.underside import Underside
 from steelyard.shape.views import Intrinsics, Views
@@ -60,14 +60,19 @@ def box() -> Scanned:
     return scanned(BOX)
 
 
+@pytest.fixture(scope="module")
+def scan(box: Scanned) -> Scan:
+    """The scan of the box as it is."""
+    return fuse(box.views)
+
+
 def off_box(xyz: np.ndarray) -> np.ndarray:
     """Signed distance to the box's surface, outside positive."""
     q = np.abs(xyz - [0, 0, 0.015]) - [0.05, 0.03, 0.015]
     return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(1), 0)
 
 
-def test_the_cloud_lies_on_the_box_and_its_normals_leave_it(box: Scanned) -> None:
-    scan = fuse(box.views)
+def test_the_cloud_lies_on_the_box_and_its_normals_leave_it(scan: Scan) -> None:
     off = off_box(scan.cloud.xyz)
     assert np.abs(np.median(off)) < 1e-4
     assert np.sqrt(np.mean(off**2)) < 5e-4
@@ -80,9 +85,9 @@ def test_the_cloud_lies_on_the_box_and_its_normals_leave_it(box: Scanned) -> Non
     assert (scan.findings, scan.moved_m) == ((), None)
 
 
-def test_no_point_has_the_colour_of_the_table(box: Scanned) -> None:
+def test_no_point_has_the_colour_of_the_table(scan: Scan) -> None:
     """Pixels beside the foot show the table, and the underside is lent the colour of what is nearest to it."""
-    cloud = fuse(box.views).cloud
+    cloud = scan.cloud
     assert cloud.seen is not None
     assert cloud.rgb is not None
     below = cloud.normals[:, 2] < -0.9  # type: ignore[index]
@@ -93,9 +98,8 @@ def test_no_point_has_the_colour_of_the_table(box: Scanned) -> None:
     assert (red > 60).mean() > 0.995  # the box is red, the table is not
 
 
-def test_the_same_views_give_the_same_cloud(box: Scanned) -> None:
-    a, b = fuse(box.views), fuse(box.views)
-    assert np.array_equal(a.cloud.xyz, b.cloud.xyz)
+def test_the_same_views_give_the_same_cloud(box: Scanned, scan: Scan) -> None:
+    assert np.array_equal(fuse(box.views).cloud.xyz, scan.cloud.xyz)
 
 
 @pytest.mark.parametrize("mesh", [BOX, BRIDGE], ids=["box", "bridge"])
@@ -148,8 +152,7 @@ def test_what_closes_the_underside_and_hangs_by_itself_is_left_out(
     assert "outliers" not in {finding.code for finding in enclose(scan.cloud).findings}
 
 
-def test_what_is_empty_is_outside(box: Scanned) -> None:
-    scan = fuse(box.views)
+def test_what_is_empty_is_outside(scan: Scan) -> None:
     inside = np.random.default_rng(0).uniform([-0.047, -0.027, 0.002], [0.047, 0.027, 0.027], (500, 3))
     up = np.array([0, 0, 0.04])
     assert scan.space.empty(inside).mean() < 0.02
@@ -157,8 +160,8 @@ def test_what_is_empty_is_outside(box: Scanned) -> None:
     assert scan.space.empty(inside - up).all()
 
 
-def test_a_solid_of_which_the_views_leave_nothing_is_refused(box: Scanned) -> None:
-    solid = enclose(fuse(box.views).cloud)
+def test_a_solid_of_which_the_views_leave_nothing_is_refused(scan: Scan) -> None:
+    solid = enclose(scan.cloud)
     with pytest.raises(CannotAnswer, match=r"no volume left: .* check their poses"):
         carved(solid, SeenSpace(lambda points: np.ones(len(points), bool)))
 
@@ -213,8 +216,7 @@ def test_views_from_one_side_close_the_far_one(arc: float) -> None:
     assert carved(enclose(scan.cloud), scan.space).mesh.volume == pytest.approx(1.8e-4, rel=0.025)
 
 
-def test_a_volume_is_less_sure_the_more_of_its_skin_nobody_saw(box: Scanned) -> None:
-    scan = fuse(box.views)
+def test_a_volume_is_less_sure_the_more_of_its_skin_nobody_saw(scan: Scan) -> None:
     solid = enclose(scan.cloud)
     assert 0.2 < scan.space.unseen < 0.6
     space = replace(scan.space, guess=None)
@@ -315,8 +317,7 @@ def test_a_tunnel_that_too_few_views_look_into_is_named_and_its_volume_is_unsure
     assert "no view measured a surface" in said[0]
 
 
-def test_of_skin_on_which_nothing_was_measured_only_what_views_ought_to_see_is_a_guess(box: Scanned) -> None:
-    scan = fuse(box.views)
+def test_of_skin_on_which_nothing_was_measured_only_what_views_ought_to_see_is_a_guess(scan: Scan) -> None:
     assert scan.space.guess is not None
     middles = np.array([[0, 0, 0.03], [0, 0, 0.06], [0, 0, 0.0], [0, 0, 0.06]])
     areas = 1e-4 * np.array([[0, 0, 3.0], [0, 0, 1.0], [0, 0, 9.0], [0, 0, -9.0]])
@@ -327,7 +328,7 @@ def test_of_skin_on_which_nothing_was_measured_only_what_views_ought_to_see_is_a
     assert not carved(solid, scan.space).findings
 
 
-def test_a_cloth_with_folds_is_named(box: Scanned) -> None:
+def test_a_cloth_with_folds_is_named(box: Scanned, scan: Scan) -> None:
     """Folds of 3 mm where the table is seen, and none on the box."""
     views, noisy = box.views, []
     for k in range(len(views)):
@@ -337,13 +338,13 @@ def test_a_cloth_with_folds_is_named(box: Scanned) -> None:
         x, y, h = np.moveaxis(views.X_WC[k].apply(ray.reshape(-1, 3)).reshape(ray.shape), -1, 0)
         fold = np.where(h < 0.003, 0.003 * np.sin(90 * x) * np.sin(70 * y), 0)
         noisy.append(np.round((z + fold) / views.depth_unit) * (z > 0))
-    scan = fuse(replace(views, depth=np.array(noisy, np.uint16)))
-    assert "table-uneven" in {finding.code for finding in scan.findings}
-    assert "table-uneven" not in {finding.code for finding in fuse(views).findings}
+    folded = fuse(replace(views, depth=np.array(noisy, np.uint16)))
+    assert "table-uneven" in {finding.code for finding in folded.findings}
+    assert "table-uneven" not in {finding.code for finding in scan.findings}
     # What the folds may hide under the box, as a share of its 30 mm, is in the bar.
-    assert shape_of(scan).solid.volume_std > 0.0015 / 0.03
+    assert shape_of(folded).solid.volume_std > 0.0015 / 0.03
     # Where there are none, only what a rim may leave open below.
-    assert fuse(views).space.unsure_m3 < 0.001 * (0.1 * 0.06 * 0.03)
+    assert scan.space.unsure_m3 < 0.001 * (0.1 * 0.06 * 0.03)
 
 
 def test_an_object_taller_than_the_cameras_are_far_keeps_its_top() -> None:

@@ -31,16 +31,17 @@ def late(log: TeamLog, **seconds: float) -> TeamLog:
 
 
 @pytest.mark.parametrize("sensing", ["poses", "twists"])
-@pytest.mark.parametrize("seconds", [0.5, -0.8, 1.7])
-def test_a_clock_far_beyond_what_a_fit_finds_is_found_and_put_right(sensing: str, seconds: float) -> None:
+def test_a_clock_far_beyond_what_a_fit_finds_is_found_and_put_right(sensing: str) -> None:
     made = trial(sensing=sensing, bases_move=sensing == "twists")
-    right, found = JointTeam().identify(made.log), JointTeam().identify(late(made.log, robot1=seconds))
-    assert found.clock_offsets_s["robot1"] == pytest.approx(seconds, abs=2e-3)
-    assert found.codes() == {"clock-offset"}
-    (said,) = found.findings
-    told = said.message.removeprefix("The stamps of 'robot1' are ").split(" ± ")[0]
-    assert float(told) == pytest.approx(abs(1e3 * seconds), abs=2)
-    assert found.mass == pytest.approx(right.mass, abs=0.05)
+    right = JointTeam().identify(made.log)
+    for seconds in (0.5, -0.8, 1.7):
+        found = JointTeam().identify(late(made.log, robot1=seconds))
+        assert found.clock_offsets_s["robot1"] == pytest.approx(seconds, abs=2e-3)
+        assert found.codes() == {"clock-offset"}
+        (said,) = found.findings
+        told = said.message.removeprefix("The stamps of 'robot1' are ").split(" ± ")[0]
+        assert float(told) == pytest.approx(abs(1e3 * seconds), abs=2)
+        assert found.mass == pytest.approx(right.mass, abs=0.05)
 
 
 def test_a_late_reference_makes_all_others_early() -> None:

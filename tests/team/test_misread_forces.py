@@ -38,6 +38,8 @@ MISREAD: dict[str, tuple[Array, str, str]] = {
     "upside down": (np.diag([1.0, -1.0, -1.0]), "Fy = -Fy, Fz = -Fz", "[1, 0, 0, 0, -1, 0, 0, 0, -1]"),
     "cycle": (np.roll(np.eye(3), 1, 0), "Fx = Fy, Fy = Fz, Fz = Fx", "[0, 1, 0, 0, 0, 1, 1, 0, 0]"),
 }  # fmt: skip
+# One of each: a unit, a unit of torques too, another order, another sign, a turn.
+OF_EACH = {way: MISREAD[way] for way in ("kgf", "lbf", "x and y", "-z", "quarter")}
 
 
 def scene(case: str = "", robots: int = 3, **changes: Any) -> TeamScene:
@@ -108,7 +110,7 @@ def test_each_misreading_is_put_right_and_named(case: str, seed: int) -> None:
     ],
 )
 def test_with_other_robots_recordings_and_wrists(changes: dict[str, Any]) -> None:
-    put_right(simulate_team(scene(**changes), 21).log, MISREAD)
+    put_right(simulate_team(scene(**changes), 21).log, OF_EACH)
 
 
 def test_torques_may_be_right_where_forces_are_not() -> None:
@@ -137,7 +139,7 @@ def test_a_sign_is_found_by_weight_alone() -> None:
     alike(found, JointTeam().identify(log))
 
 
-@pytest.mark.parametrize("case", ["A", "B", "C", "D"])
+@pytest.mark.parametrize("case", ["A", "D"])  # the least noise of forces and the most
 @pytest.mark.parametrize("robots", [2, 3, 5])
 def test_right_forces_are_left_alone(case: str, robots: int) -> None:
     for seed in range(4):

@@ -86,7 +86,7 @@ def said(log: TeamLog) -> str:
 
 
 @pytest.mark.parametrize("way", SPOILED)
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", ["A", "D"])  # the least noise and the most
 def test_one_robot_misread_is_named_with_how(way: str, name: str) -> None:
     spoil, words = SPOILED[way]
     number = list(SPOILED).index(way) + list(CASES).index(name)

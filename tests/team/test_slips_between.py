@@ -27,17 +27,19 @@ def off(found: TeamEstimate, made: TeamTrial) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("robot", [0, 1])
-def test_a_slip_before_a_recording_is_named_and_put_right(case: str, robot: int) -> None:
+def test_a_slip_before_a_recording_is_named_and_put_right(case: str) -> None:
     change = np.array([0.0, -0.003, 0.004])
-    # Before the recording's first sample: in it, the grasp is where it is.
-    made = trial(case, 100, Slip(robot, change, -1.0))
-    found = JointTeam().identify(made.log)
-    (said,) = (f for f in found.findings if f.code == "grasp-slipped")
-    assert said.message.startswith(f"The grasp of 'robot{robot}' slipped by ")
-    assert "between 'still-4' and 'motion-5'" in said.message
-    assert float(said.message.split(" by ")[1].split(" mm")[0]) == pytest.approx(5.0, abs=0.5)
-    assert max(off(found, made)) < max(1.5 * max(off(JointTeam().identify(trial(case, 100).log), made)), 2.5)
+    sound = trial(case, 100)
+    usual = max(off(JointTeam().identify(sound.log), sound))
+    for robot in (0, 1):
+        # Before the recording's first sample: in it, the grasp is where it is.
+        made = trial(case, 100, Slip(robot, change, -1.0))
+        found = JointTeam().identify(made.log)
+        (said,) = (f for f in found.findings if f.code == "grasp-slipped")
+        assert said.message.startswith(f"The grasp of 'robot{robot}' slipped by ")
+        assert "between 'still-4' and 'motion-5'" in said.message
+        assert float(said.message.split(" by ")[1].split(" mm")[0]) == pytest.approx(5.0, abs=0.5)
+        assert max(off(found, made)) < max(1.5 * usual, 2.5)
 
 
 def test_a_slip_that_is_far_beyond_noise_is_one_among_many_robots() -> None:

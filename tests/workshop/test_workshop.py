@@ -95,7 +95,7 @@ def test_the_set_is_as_mixed_as_real_tools_are() -> None:
 @pytest.mark.parametrize("name", FAMILIES)
 def test_moments_agree_with_monte_carlo(name: str) -> None:
     made = tool(name)
-    assert_near(column_moments(made.mesh, cells=200_000), made.parts.moments.sum(0))
+    assert set(made.mesh.part) == set(range(len(made.parts)))  # no surface is of none
     for k in range(len(made.parts)):
         assert_near(column_moments(made.mesh.of_part(k)), made.parts.moments[k])
 
