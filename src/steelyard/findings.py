@@ -84,11 +84,6 @@ AT_REST: dict[str, str] = {
     "centroids-coplanar": "Record a log with times in which the object turns, or merge parts of the same material.",
     "more-parts-than-rank": "Merge parts of the same material, or record a log with times in which the object turns.",
 }
-# And where a log has chosen among the cuts of a scan.
-WEIGHED: dict[str, str] = {
-    "parts-unsure": "Nothing to do: the forces of the log chose among the cuts. If you know how many parts there are, "
-    "segment the scan with --parts and identify with the file that it writes.",
-}
 # And where nothing measured the acceleration of S.
 UNMEASURED: dict[str, str] = {
     "inertia-not-identified": "Record the position of the sensor or an accelerometer as well: "

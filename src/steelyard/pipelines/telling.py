@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.findings import AT_REST, BARE, REMEDIES, UNEXPLAINED, UNMEASURED, WEIGHED, Finding, other_than
+from steelyard.findings import AT_REST, BARE, REMEDIES, UNEXPLAINED, UNMEASURED, Finding, other_than
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import ADD_POSES
 from steelyard.logs.recording import Recording
@@ -98,14 +98,20 @@ def told(estimate: Estimate, noticed: Noticed, rows: FitRows, load: Load, parts:
     if any(finding.code == "sensor-turned" for finding in of_sensor):
         before = other_than(before, "sensor-turned")  # the fit tells it better
     if not (parts is None or isinstance(parts, Parts)):
-        before = (*before, *(finding.instead(WEIGHED if load.shape else {}) for finding in parts.findings))
-        estimate = estimate.noted(*parts.notes)
+        chosen = load.shape is not None  # by the forces of the log, which leave nothing to do about the number of parts
+        before = (*before, *(other_than(parts.findings, "parts-unsure") if chosen else parts.findings))
+        estimate = estimate.noted(*parts.notes, *(_in_doubt(parts.findings) if chosen else ()))
     # In a wrong unit that was left in, rows only seem touched.
     touched = () if any(f.code in OF_UNITS for f in late) else rows.touched
     found = (*before, *late, *of_sensor, *estimate.findings, *rows.aligned.findings, *touched)
     if not (load.bias.free and _suffers(estimate)):
         found = other_than(found, *OF_BIAS)
     return replace(estimate, findings=()).with_findings(*found)
+
+
+def _in_doubt(findings: tuple[Finding, ...]) -> list[str]:
+    """Return the note on a number of parts that shape and colour left open."""
+    return [f"{f.message[:1].lower()}{f.message[1:]}".rstrip(".") for f in findings if f.code == "parts-unsure"]
 
 
 def _suffers(estimate: Estimate) -> bool:
