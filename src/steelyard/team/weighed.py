@@ -20,6 +20,8 @@ from steelyard.team.estimate import TeamEstimate
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.misread.files import require_metres
 from steelyard.team.misread.forces import reread, with_one_reading
+from steelyard.team.misread.moment_places import with_moments_at_grasps
+from steelyard.team.misread.own_gain import own_gain
 from steelyard.team.misread.signs import TORQUES_TURNED, sign_finding, torque_sign_finding, torques_of_other_sign
 from steelyard.team.motion_fit import MotionFit, against
 from steelyard.team.payload.body_rows import PayloadRows, balance_frame, require_balance, require_runs, summing
@@ -28,8 +30,6 @@ from steelyard.team.payload.fit import PayloadFit, Weighing, fit_payload
 from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.late_forces import with_timely_forces
 from steelyard.team.payload.model import Group, unit_bias, units_of_body
-from steelyard.team.payload.moment_places import with_moments_at_grasps
-from steelyard.team.payload.own_gain import own_gain
 from steelyard.team.payload.spectra import band_edges, gathered, motion_noise
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.yielding import Yields

@@ -21,9 +21,9 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding, quoted, with_bar
 from steelyard.team.definite import shown_axes
 from steelyard.team.misread.forces import reread
+from steelyard.team.misread.moment_places import loud
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.model import Group
-from steelyard.team.payload.moment_places import loud
 from steelyard.team.payload.spectra import NO_LEVERS, SEEN, regressors
 
 # Standard deviations from which a gain is looked into, and from which it counts by the noise of the fit without it.
