@@ -22,7 +22,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.full_fit import CALM, FEWEST_BLOCKS, NOISE, Rows, at_rest, moves, noise_share
 from steelyard.sanity.fitted.yielding import taken_away
-from steelyard.sanity.readings.static_fit import clock_words, compensated
+from steelyard.sanity.readings.static_fit import compensated, stamp_words
 from steelyard.spatial import cross_matrix
 
 # They differ where that is so many standard deviations, by leaving out stretches, beyond this share of the mass or this
@@ -122,9 +122,9 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
     # About one axis a lever passes for a mass, and noise of either draws both.
     least = SHARE + NOISE * found.noise if planar_finding(log.gravity) else SCALED
     if _taken_away(found, least) and _taken_away(two_masses(log, bending=True), least):
-        return (compensated(both, clock_words(found.mass, found.weighed)),)
+        return (compensated(both, stamp_words(found.mass, found.weighed)),)
     if -short > max(SURE * spread, (SHARE + NOISE * found.noise) * abs(found.weighed)):
-        other = clock_words(found.mass, found.weighed)
+        other = stamp_words(found.mass, found.weighed)
         text = f"{both}the load was not accelerated as the poses say.{f' {other}.' if other else ''}"
         return (Finding.of("motion-mismatch", text),)
     far, where = np.abs(found.apart), found.less_std[1:] / max(found.weighed, 1e-9)

@@ -2,7 +2,7 @@
 
 Beside the mass that is weighed stands the mass that is accelerated. UR, Franka and others subtract the weight of the
 payload that was set in the controller before they report the force. What it takes to accelerate the load is left in, or
-more of it. A clock that runs too fast, or positions in a smaller unit than was said, make accelerations too large, and
+more of it. Stamps too close together, or positions in a smaller unit than was said, make accelerations too large, and
 the mass that they show too small.
 
 Throughout, `gravity` (3,) [m/s^2] is in W, and `rotation` (N, 3, 3) turns S into W, as the log is read.
@@ -161,14 +161,14 @@ def apart_clearly(view: Glance, gravity: Array, rotation: Array) -> bool:
     return clear(left[0], left[1], (np.arange(len(force)) / rate).astype(np.int64), free) > CLEAR
 
 
-def clock_words(moved: float, weighed: float) -> str:
-    """Say which clock or unit of positions makes a weighed mass [kg] look as another by acceleration; "" if none."""
+def stamp_words(moved: float, weighed: float) -> str:
+    """Say which stamps or unit of positions make a weighed mass [kg] look as another by acceleration; "" if none."""
     ratio = max(moved, weighed) / max(min(moved, weighed), 1e-300)
     if not CLOCK < ratio < WRONG_RATE**2:
         return ""
-    clock, size = ("fast", "large") if weighed > moved else ("slow", "small")
+    lie, size = ("close together", "large") if weighed > moved else ("far apart", "small")
     rate = about(float(np.sqrt(ratio)))
-    return f"A clock that runs {rate} times too {clock}, or positions {about(ratio)} times too {size}, do so"
+    return f"Stamps {rate} times too {lie}, or positions {about(ratio)} times too {size}, do so"
 
 
 def compensated(both: str, other: str) -> Finding:
@@ -188,7 +188,7 @@ def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) ->
     )
     large = abs(moved) > SURE * spread[0] and TOO_LARGE * (abs(moved) + SURE * spread[0]) < weighed - SURE * spread[1]
     if large and left < CLOSELY:
-        text = f"{both}accelerations are too large. {clock_words(abs(moved), weighed)}."
+        text = f"{both}accelerations are too large. {stamp_words(abs(moved), weighed)}."
         return (Finding.of("motion-mismatch", text),)
     small = weighed > SURE * spread[1] and abs(moved) - SURE * spread[0] > WRONG_RATE**2 * weighed
     if small and left < CLOSELY:
@@ -200,5 +200,5 @@ def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) ->
         return ()
     if not apart_clearly(view, gravity, rotation):
         return ()
-    other = clock_words(abs(moved), weighed) if weighed > SURE * spread[1] and left < CLOSELY else ""
+    other = stamp_words(abs(moved), weighed) if weighed > SURE * spread[1] and left < CLOSELY else ""
     return (compensated(both, other),)
