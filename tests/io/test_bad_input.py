@@ -57,6 +57,8 @@ DESCRIPTIONS: list[tuple[str, str, str, str]] = [
     # what, old, new, message
     ("unknown section", "[log]", "[logs]", 'log.toml: unknown key "logs". Did you mean "log"? Keys here: log, noise, object, stream, robot.'),
     ("unknown key", "gravity =", "gravty =", 'log.toml, [log]: unknown key "gravty". Did you mean "gravity"? Keys here: gravity, wrench, tool.'),
+    ("stream key in [log]", "[log]", '[log]\nkind = "poses"', 'log.toml, [log]: unknown key "kind". It stands in [[stream]]. Keys here: gravity, wrench, tool.'),
+    ("key of [log] above it", "[log]", 'wrench = "on-sensor"\n[log]', 'log.toml: unknown key "wrench". It stands in [log]. Keys here: log, noise, object, stream, robot.'),
     ("unknown stream key", "torque  ", "torqe   ", 'log.toml, [[stream]] 1: unknown key "torqe". Did you mean "torque"? Keys here: path, topic, frames, kind, time, delay, mount, force, torque, rotation, position, linear_velocity, angular_velocity, linear_acceleration, angular_acceleration, specific_force, gravity, joint_position, joint_torque.'),
     ("unknown wrench", "[log]", '[log]\nwrench = "sensor"', 'log.toml, [log]: unknown wrench "sensor". Did you mean "on-sensor"? Possible here: on-sensor, on-object.'),
     ("gravity of two", "[0, 0, -9.81]", "[0, -9.81]", 'log.toml, [log]: "gravity" must be a list of 3 finite numbers; got [0, -9.81].'),

@@ -237,3 +237,40 @@ def test_poses_that_gravity_pulls_alike_are_not_clipped(cut: bool) -> None:
     table = Stream("poses.csv", {"rotation": turns, "force": force, "torque": torque}, poses=True)
     _, found = examine_rows(Recording((table,), np.array([0.0, 0.0, -9.81])))
     assert [one.code for one in found] == ["channel-saturated"] * cut
+
+
+def rests(quantum: float = 1.0, noise: float = 0.6) -> Stream:
+    """Return forces [N] of a quantum beyond the noise, at eight rests and on the way from one to the next."""
+    rng = np.random.default_rng(2)
+    time = np.arange(8000) / 500
+    places = rng.normal(0, 60, (9, 3))
+    where, step = np.divmod(time / 2, 1)
+    share = np.clip(2 * step - 1, 0, 1)[:, None]
+    here = where.astype(int)
+    force = places[here] * (1 - share) + places[here + 1] * share + noise * rng.normal(size=(8000, 3))
+    return Stream("a.csv", {"force": quantum * np.round(force / quantum)}, time=time)
+
+
+def with_force_y(stream: Stream, y: np.ndarray) -> Stream:
+    force = stream.channels["force"].copy()
+    force[:, 1] = y
+    return replace(stream, channels={"force": force})
+
+
+def test_stuck_and_clipped_channels_of_a_coarse_quantum_are_told() -> None:
+    """They were reported as contact: blocks of a channel at rest repeat often, and steps into a stop are small."""
+    stream = rests()
+    y = stream.channels["force"][:, 1]
+    assert without_clipped(stream) == (stream, ())
+    assert without_frozen(stream) == (stream, ())
+    held = y.copy()
+    held[2000:3500] = held[2000]
+    assert [f.code for f in without_frozen(with_force_y(stream, held))[1]] == ["channel-stuck"]
+    clipped = with_force_y(stream, np.maximum(y, np.quantile(y, 0.25)))
+    assert [f.code for f in without_clipped(clipped)[1]] == ["channel-saturated"]
+
+
+def test_a_coarse_channel_that_rests_at_one_number_is_not_stuck() -> None:
+    stream = rests(noise=0.1)
+    assert without_clipped(stream) == (stream, ())
+    assert without_frozen(stream) == (stream, ())

@@ -59,11 +59,12 @@ class Entry:
         """Return the error that says `text` about this place."""
         return BadDescription(f"{self.where}: {text}")
 
-    def only(self, *allowed: str) -> None:
-        """Raise BadDescription at a key that is not allowed here, with the nearest one that is."""
+    def only(self, *allowed: str, places: Mapping[str, str] | None = None) -> None:
+        """Raise BadDescription at a key that is not allowed here, with its place or the nearest one that is."""
         for key in self.values:
             if key not in allowed:
-                near = close_match(key, allowed)
+                place = (places or {}).get(key)
+                near = f" It stands in {place}." if place else close_match(key, allowed)
                 raise self.error(f'unknown key "{key}".{near} Keys here: {listed(allowed)}.')
 
     def require(self, key: str, example: str) -> Any:

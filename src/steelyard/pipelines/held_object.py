@@ -47,9 +47,8 @@ def identify(
     known = _of_tool(tool, options) if isinstance(tool, Recording) else tool
     of_tool = () if known is None else of_tools_run(known)
     known = None if known is None else _with_bias_as(known, recording)
-    given = recording.gravity
-    recording, before = examine(recording)
-    recording, before, rows = rows_as_given(given, recording, before, options)
+    examined, before = examine(recording)
+    recording, before, rows = rows_as_given(recording, examined, before, options)
     before, of_sign = sign_found(before, recording)
     before = noticed_before(before, recording, rows)
     shape = placed(parts, recording.object_pose, recording.object_pose_std)

@@ -28,11 +28,10 @@ def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = 
 
     tool  what was taken away from the answer, and is in the log
     """
-    gravity = recording.gravity
-    recording, before = examine(recording)
+    examined, before = examine(recording)
     found = any(note.startswith(GRAVITY_FOUND) for note in estimate.notes)
     options = Options(gravity="unknown" if found else "given")
-    recording, _, rows = rows_as_given(gravity, recording, before, options)
+    recording, _, rows = rows_as_given(recording, examined, before, options)
     log = rows.aligned.log
     if rows.room is not None and rows.aligned.rotation is not None:
         log = rows.room.put_right(log, rows.aligned.rotation.matrix)

@@ -286,16 +286,16 @@ class Reading:
 
 
 def rows_as_given(
-    gravity: Array, recording: Recording, before: tuple[Finding, ...], options: Options
+    given: Recording, recording: Recording, before: tuple[Finding, ...], options: Options
 ) -> tuple[Recording, tuple[Finding, ...], FitRows]:
     """Return recording, findings before the fit, and rows; with gravity as given where a bias passed for a tilt of it.
 
-    gravity  (3,) [m/s^2] in W as given, before the recording was examined
+    given  the recording before it was examined
     """
     recording, rows = Reading(recording, before, options).without_play()
     if "base-tilted" not in codes(before):
         return recording, before, rows
-    level = replace(recording, gravity=gravity)
+    level = replace(recording, gravity=given.gravity, gravity_std=given.gravity_std)
     others = other_than(before, "base-tilted")
     again = Reading(level, others, options).rows_to_fit()
     return (recording, before, rows) if again.room is None else (level, others, again)

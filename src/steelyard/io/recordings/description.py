@@ -17,7 +17,7 @@ from steelyard.errors import BadDescription, BadInput
 from steelyard.io.contents import load_toml, parse_toml
 from steelyard.io.entries import Entry, each, gathered
 from steelyard.io.example import EXAMPLE
-from steelyard.io.streams.entries import StreamSpec, parse_pose, parse_stream
+from steelyard.io.streams.entries import STREAM, StreamSpec, parse_pose, parse_stream
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, STANDARD_GRAVITY
 from steelyard.spatial import Pose
 
@@ -27,7 +27,15 @@ _LOUDEST = 1e6
 NOISE = ("force", "torque", "acceleration", "angular_acceleration")  # whose standard deviation can be told
 SIGNS = {"on-object": 1, "on-sensor": -1}  # of the wrench
 ARM = ("urdf", "sensor_link", "base_link")  # keys that describe an arm
+_LOG = ("gravity", "wrench", "tool")
 _SECTIONS = ("log", "noise", "object", "stream", "robot")
+# Where keys stand that may be looked for in [log], or above all sections.
+_PLACES = {
+    **dict.fromkeys(STREAM, "[[stream]]"),
+    **dict.fromkeys(_LOG, "[log]"),
+    **dict.fromkeys(ARM, "[robot]"),
+    "pose_in_sensor": "[object]",
+}
 
 # Gravity that nobody states, and how well it is known.
 ASSUMED = f"{STANDARD_GRAVITY} ± {STANDARD_GRAVITY * ASSUMED_GRAVITY_STD:.3f} m/s²"
@@ -87,7 +95,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
     top = Entry(values, name)
     if "team" in top:
         raise top.error("[team] makes this a team description. Use it with: steelyard team")
-    top.only(*_SECTIONS)
+    top.only(*_SECTIONS, places=_PLACES)
     log = top.section("log")
     found = gathered(
         {
@@ -108,7 +116,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
 
 
 def _gravity(log: Entry) -> Array:
-    log.only("gravity", "wrench", "tool")
+    log.only(*_LOG, places=_PLACES)
     return parse_gravity(log) if "gravity" in log else default_gravity()
 
 

@@ -26,7 +26,7 @@ _JOINT = ("joint_position", "joint_torque")
 # What a robot of a team may tell beside QUANTITIES: the joints of an Omnid, and whether it holds the payload.
 ROBOT: dict[str, int] = {"joint_position": 6, "joint_torque": 3, "carrying": 1}
 MOUNTED = {"force", "torque", "specific_force"}  # what is read in the stream's own frame
-_KEYS = ("path", "topic", "frames", "kind", "time", "delay", "mount", *QUANTITIES)
+STREAM = ("path", "topic", "frames", "kind", "time", "delay", "mount", *QUANTITIES)
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def parse_stream(entry: Entry, robot: bool = False, arm: bool = True) -> StreamS
         "frames": _frames,
     }
     given = {key: partial(step, entry) for key, step in steps.items() if key in entry}
-    found = gathered({"keys": lambda: bare.only(*_KEYS, *(ROBOT if robot else _JOINT)), **given})
+    found = gathered({"keys": lambda: bare.only(*STREAM, *(ROBOT if robot else _JOINT)), **given})
     kind, time = found.get("kind"), found.get("time")
     if time is None and "topic" in entry and kind != "poses":
         # A topic whose stream names no clock has the stamps of its messages [ns].

@@ -39,7 +39,10 @@ def examine_level(recording: Recording, view: Glance, reading: Reading) -> tuple
         return recording, (_turned_finding(turned, reading.fit, stream),)
     if tilt is None or not _plain(tilt, reading.fit):
         return recording, ()
-    return replace(recording, gravity=tilt.gravity), (_tilted_finding(tilt),)
+    # Gravity that stands in another frame is no tilt, and says nothing of one.
+    unseen = tilt.length_std if tilt.angle < STEEP else 0.0
+    length_std = float(np.hypot(recording.gravity_std, unseen))
+    return replace(recording, gravity=tilt.gravity, gravity_std=length_std), (_tilted_finding(tilt),)
 
 
 def _mixed_finding(mirror: Mirror, given: StaticFit) -> Finding:
@@ -70,6 +73,8 @@ def _tilted_finding(tilt: GlanceTilt) -> Finding:
     )
     if tilt.angle >= STEEP:
         return Finding.of("gravity-frame", message)
+    if tilt.blind is not None:
+        message += f" One as large there would move the mass by {percent(tilt.length_std)}, which its bar holds."
     share = percent(float(np.sin(tilt.angle)))
     pull = f"On a level base a pull of {share} of the weight looks the same, and the mass is then off by about as much."
     return Finding.of("base-tilted", f"{message} {pull}")

@@ -44,6 +44,14 @@ class GlanceTilt:
     torque_share: float
     blind: Array | None = None
 
+    @property
+    def length_std(self) -> float:
+        """How much a tilt along `blind`, as large as the one found, changes what is seen of gravity, as a share."""
+        if self.blind is None:
+            return 0.0
+        along = abs(float(self.blind @ self.gravity)) / float(np.linalg.norm(self.gravity))
+        return self.angle * along / float(np.sqrt(max(1 - along**2, 1e-12)))
+
 
 @dataclass(frozen=True, eq=False)
 class Turn:

@@ -21,6 +21,9 @@ from steelyard.spatial import cross_matrix
 
 # A channel is frozen when it holds still for this long although it never else does.
 FROZEN_ROWS, FROZEN_S = 50, 0.25
+# One that repeats in more than this share of some block of so many rows has a quantum too coarse to tell: the first
+# where it holds still at several values, else the second. Others stand still longer than they would by this chance.
+COARSE, CHANCE = (0.5, 0.8), 1e-3
 
 # Rows in which gravity and forces are the same to so small a share of themselves repeat a pose without noise.
 SAME_PULL = 1e-6
@@ -97,7 +100,6 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
             frozen = rows
     for quantity in (q for q in NOISY if q in stream.channels):
         values = stream.channels[quantity]
-        same = values[1:] == values[:-1]
         dead, noisy = _dead(values), noise_shares(values) > NOISE_SHARE
         for axis in range(3):
             name = f"{quantity} {'xyz'[axis]}"
@@ -105,7 +107,7 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
             rows = _frozen_rows(values[:, axis], stream.time) & ~frozen & noisy[others].any()
             if dead[axis]:
                 found.append((name, "does not change at all while its neighbours do"))
-            elif rows.any() and (same[rows[1:]][:, others].mean(0) < 0.5).any():
+            elif rows.any() and _alone(values, axis, rows):
                 # One that only came to rest a little before the others, as behind a filter, is no case of its own.
                 if rows.sum() >= FROZEN_ROWS:
                     found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else"))
@@ -174,17 +176,29 @@ def _hung(stream: Stream, quantities: tuple[str, ...]) -> tuple[Mask, bool]:
     return rows, len(jumping) == len(held)
 
 
-def _frozen_rows(column: Array, time: Array) -> Mask:
-    """Return rows (N,) of runs of one value that are long, in a channel that moves on everywhere else."""
-    same = column[1:] == column[:-1]
+def _alone(values: Array, axis: int, rows: Mask) -> bool:
+    """Tell whether another axis of values (N, 3) goes on in these rows (N,)."""
+    others = np.delete(values, axis, axis=1)
+    return bool(((others[1:] == others[:-1])[rows[1:]].mean(0) < 0.5).any())
+
+
+def _frozen_rows(column: Array, time: Array, aside: Mask | None = None) -> Mask:
+    """Return rows (N,) of runs of one value that are long, in a channel that moves on everywhere else.
+
+    aside  rows (N,) that do not tell how often its numbers repeat
+    """
+    same, none = column[1:] == column[:-1], np.zeros(len(column), bool)
     long = lasting(same, _rows_needed(time))
-    if not long.any():
-        return np.zeros(len(column), bool)
-    elsewhere = same[~long]
-    blocks = max(len(elsewhere) // FROZEN_ROWS, 1)
-    if len(elsewhere) < FROZEN_ROWS or max(b.mean() for b in np.array_split(elsewhere, blocks)) > 0.5:
-        return np.zeros(len(column), bool)
-    return around(long)
+    elsewhere = same[~(long if aside is None else long | aside[1:])]
+    if not long.any() or len(elsewhere) < FROZEN_ROWS:
+        return none
+    share = max(b.mean() for b in np.array_split(elsewhere, max(len(elsewhere) // FROZEN_ROWS, 1)))
+    one_value = bool((column[1:][long] == column[1:][long][0]).all())
+    if share > COARSE[one_value]:
+        return none
+    # At rest amid a quantum all but sqrt(share) of the rows are at one value, or more: so long it lasts by chance.
+    by_chance = 2 * np.log(CHANCE / len(column)) / np.log(max(share, 1e-9))
+    return around(lasting(long, by_chance))
 
 
 def _rows_needed(time: Array) -> float:
@@ -201,11 +215,23 @@ def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
         for axis in np.flatnonzero(noisy).tolist():
             for extreme in (values[:, axis].min(), values[:, axis].max()):
                 rows = clipped_rows(values[:, axis], float(extreme))
+                if not rows.any() and stream.time is not None:
+                    rows = _held_rows(values, axis, float(extreme), stream.time)
                 if rows.any():
                     found.append((quantity, axis, float(extreme), int(rows.sum())))
                     clipped |= rows
     rest, then = left_out(stream, with_neighbours(clipped))
     return rest, tuple(saturated(stream.name, *each, len(stream), then) for each in found)
+
+
+def _held_rows(values: Array, axis: int, extreme: float, time: Array) -> Mask:
+    """Return rows (N,) at the extreme value of an axis that stands still there while others go on.
+
+    So it is clipped, though its steps into the stop are no larger than its quantum.
+    """
+    at = values[:, axis] == extreme
+    held = _frozen_rows(values[:, axis], time, at) & at
+    return at if held.any() and _alone(values, axis, held) else np.zeros(len(at), bool)
 
 
 def clipped_table(stream: Stream, gravity: Array | None) -> list[Finding]:
