@@ -147,8 +147,8 @@ def test_columns_are_told_before_a_sensor_that_only_seems_turned() -> None:
 
 
 def test_it_is_said_with_the_refusal_too(made: Recording) -> None:
-    with pytest.raises(CannotAnswer, match="Noticed before the fit: The forces fit one body if they are read as"):
-        held_object.identify(forces(made, np.diag([1.0, -1, 1])))
+    with pytest.raises(CannotAnswer, match="Noticed before the fit: The wrench is turned by 180 degrees"):
+        held_object.identify(forces(made, np.diag([1.0, -1, -1])))
 
 
 def noisy(recording: Recording, std: float) -> Recording:

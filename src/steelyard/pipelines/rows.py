@@ -35,6 +35,7 @@ from steelyard.sanity.holding.consensus import FINE
 from steelyard.sanity.holding.contact import agreeing
 from steelyard.sanity.holding.load_change import small_slip
 from steelyard.sanity.one_body import one_body
+from steelyard.sanity.readings.torques import OPPOSED, turned_round
 
 # How the note begins that says which direction of gravity was used.
 GRAVITY_FOUND = "gravity was estimated"
@@ -288,11 +289,16 @@ class Reading:
 def rows_as_given(
     given: Recording, recording: Recording, before: tuple[Finding, ...], options: Options
 ) -> tuple[Recording, tuple[Finding, ...], FitRows]:
-    """Return recording, findings before the fit, and rows; with gravity as given where a bias passed for a tilt of it.
+    """Return recording, findings before the fit, and rows; with what rows alone tell put right.
+
+    Torques may have the other sign, and a bias may have passed for a tilt: then gravity is as given.
 
     given  the recording before it was examined
     """
     recording, rows = Reading(recording, before, options).without_play()
+    if OPPOSED in rows.units:
+        recording, before = turned_round(recording), (*before, OPPOSED)
+        recording, rows = Reading(recording, before, options).without_play()
     if "base-tilted" not in codes(before):
         return recording, before, rows
     level = replace(recording, gravity=given.gravity, gravity_std=given.gravity_std)

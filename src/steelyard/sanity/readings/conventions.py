@@ -16,7 +16,7 @@ from steelyard.check import Array
 from steelyard.findings import REMEDIES, Finding
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.glance import Glance, glance
-from steelyard.sanity.readings.level import examine_level
+from steelyard.sanity.readings.level import examine_level, examine_order
 from steelyard.sanity.readings.levers import far_away
 from steelyard.sanity.readings.rivals import (
     GOOD,
@@ -71,6 +71,9 @@ def _judged(recording: Recording, view: Glance) -> tuple[Recording, tuple[Findin
     if best is not None:
         return as_read(recording, best), rival_findings(best, reading)
     named = examine_both_masses(view, recording.gravity, reading.rotation)
+    read, findings = examine_order(recording, view, reading)
+    if findings:
+        return read, (*named, *findings)
     # What a controller leaves of a weight may have either sign.
     left_over = any(finding.code == "weight-compensated" for finding in named)
     read, findings = (recording, ()) if left_over else _signs(recording, view, reading)

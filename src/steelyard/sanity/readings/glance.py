@@ -83,6 +83,10 @@ class Glance:
         slow = lowpass(values, CUTOFF_HZ, self.rate, order=2)
         return slow if self.kept is None else slow[self.kept]
 
+    def in_sensor(self, part: str, values: Array, rotation: Array | None) -> Array:
+        """Return values (N, 3) of a part of the wrench, in W or S as it is, in S."""
+        return values if rotation is None or part not in self.world else _into_sensor(rotation, values)
+
     def seen(self, gravity: Array, rotation: Array | None) -> Seen:
         """Return wrench and motion in S, low-passed, for a gravity in W (3,) [m/s^2] and rotations (N, 3, 3)."""
         if rotation is None:
@@ -90,12 +94,9 @@ class Glance:
             return Seen(self.smooth(self.wrench), self.smooth(pull), dead=self.dead)
         own = gravity if self.acceleration is None else gravity - self.acceleration
         pull = _into_sensor(rotation, np.broadcast_to(own, (len(self), 3)))
+        torque, force = np.split(self.wrench, 2, 1)
         wrench = np.concatenate(
-            [
-                _into_sensor(rotation, v) if part in self.world else v
-                for part, v in zip(_PARTS, np.split(self.wrench, 2, 1), strict=True)
-            ],
-            1,
+            [self.in_sensor("torque", torque, rotation), self.in_sensor("force", force, rotation)], 1
         )
         if self.rate is None:
             return Seen(wrench, pull, dead=self.dead)

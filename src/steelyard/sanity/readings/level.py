@@ -1,4 +1,4 @@
-"""Level: gravity in W as forces show it, beside a turned sensor and force columns that are mixed up."""
+"""Level: force columns in another order, gravity in W as forces show it, and a turned sensor beside it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 from steelyard.findings import Finding, percent
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.readings.glance import Glance
+from steelyard.sanity.readings.orders import order_of_forces
 from steelyard.sanity.readings.rivals import LEVEL, MUCH_BETTER, STEEP, Reading, sign_of
 from steelyard.sanity.readings.static_fit import StaticFit
-from steelyard.sanity.readings.tilt import GlanceTilt, Mirror, Turn, mirrored, tilt_at_a_glance, turn_at_a_glance
+from steelyard.sanity.readings.tilt import GlanceTilt, Turn, tilt_at_a_glance, turn_at_a_glance
 from steelyard.sanity.words import axis_words, direction_words, mount_remedy, mounted, unexplained
 
 # With fewer poses or stretches than this, a direction of gravity fits by chance.
@@ -25,15 +26,12 @@ SENSOR_TURN = np.radians(10.0)
 def examine_level(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording with gravity along the direction that the wrench shows, where that is plainly another.
 
-    Force columns in another order, and a sensor that is turned, are told of where they explain more; they are left in.
+    A sensor that is turned is told of where it explains more, and left in.
     """
-    if reading.rotation is None or reading.fit.force_share < LEVEL or int(view.block.max()) + 1 < FEWEST_BLOCKS:
+    if not _may_be_off(view, reading):
         return recording, ()
     tilt = tilt_at_a_glance(view, reading.gravity, view.rotation, reading.fit.mass)
-    sign = sign_of(view, reading)
-    turned, mirror = turn_at_a_glance(view, reading.gravity, sign), mirrored(view, reading.gravity, sign)
-    if mirror is not None and _columns_mixed(mirror, turned, tilt, reading.fit):
-        return recording, (_mixed_finding(mirror, reading.fit),)
+    turned = turn_at_a_glance(view, reading.gravity, sign_of(view, reading))
     if turned is not None and _sensor_turned(turned, tilt, reading.fit):
         stream = next(s for s in recording.streams if "force" in s.channels)
         return recording, (_turned_finding(turned, reading.fit, stream),)
@@ -45,13 +43,30 @@ def examine_level(recording: Recording, view: Glance, reading: Reading) -> tuple
     return replace(recording, gravity=tilt.gravity, gravity_std=length_std), (_tilted_finding(tilt),)
 
 
-def _mixed_finding(mirror: Mirror, given: StaticFit) -> Finding:
-    message = (
-        f"The forces fit one body if they are read as {mirror.words}: so, "
-        f"{unexplained(mirror.force_share, given.force_share)}; the answer does not assume this."
-    )
-    remedy = "Check order and signs of the force columns in the description, and of the torque columns with them."
-    return Finding("force-unit", message, remedy, left_in=True)
+def examine_order(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with force columns in the order and with the signs that explain it, and what is said of it.
+
+    Where another order explains nearly as much it is told of, and left in.
+    """
+    mixed = None
+    if _may_be_off(view, reading):
+        mixed = order_of_forces(recording, view, reading.gravity, reading.rotation)
+    # Forces in W point down however they are read: misread rotations leave a little, that by chance another order does
+    # not.
+    better = MUCH_BETTER**2 if "force" in view.world else MUCH_BETTER
+    if mixed is None or mixed.left > min(better * reading.fit.force_share, 0.3):
+        return recording, ()
+    tilt = tilt_at_a_glance(view, reading.gravity, view.rotation, reading.fit.mass)
+    turned = turn_at_a_glance(view, reading.gravity, sign_of(view, reading))
+    if any(rival is not None and mixed.left > 0.5 * rival.force_share for rival in (turned, tilt)):
+        return recording, ()
+    return mixed.put_right(recording) if mixed.sure else recording, (mixed.finding(reading.fit.force_share),)
+
+
+def _may_be_off(view: Glance, reading: Reading) -> bool:
+    """Tell whether enough is left of the force, in enough poses or stretches, to look for other directions."""
+    enough = int(view.block.max()) + 1 >= FEWEST_BLOCKS
+    return enough and reading.rotation is not None and reading.fit.force_share >= LEVEL
 
 
 def _turned_finding(turned: Turn, given: StaticFit, stream: Stream) -> Finding:
@@ -87,13 +102,6 @@ def _sensor_turned(turned: Turn, tilt: GlanceTilt | None, given: StaticFit) -> b
         and turned.force_share < min(MUCH_BETTER * given.force_share, 0.3)
         and (tilt is None or turned.force_share < 0.5 * tilt.force_share)
     )
-
-
-def _columns_mixed(mirror: Mirror, turned: Turn | None, tilt: GlanceTilt | None, given: StaticFit) -> bool:
-    """Tell whether forces read in another order or sign explain what no turn of S and no tilted gravity does."""
-    rivals = [found.force_share for found in (turned, tilt) if found is not None]
-    bar = min(MUCH_BETTER * given.force_share, 0.3, *(0.5 * share for share in rivals))
-    return mirror.force_share < bar
 
 
 def _plain(tilt: GlanceTilt, given: StaticFit) -> bool:

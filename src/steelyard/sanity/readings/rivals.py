@@ -22,6 +22,7 @@ from steelyard.findings import Finding
 from steelyard.logs.misread import INVERTED, MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.glance import Glance, glance, in_axes
+from steelyard.sanity.readings.orders import order_of_forces
 from steelyard.sanity.readings.static_fit import StaticFit, better_fit, varies
 from steelyard.sanity.readings.tilt import GlanceTilt, tilt_at_a_glance, turn_at_a_glance
 from steelyard.sanity.words import unexplained
@@ -105,7 +106,14 @@ def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Readin
     # Of two mistakes each must leave much less than the other alone does.
     both = () if one else able(_misread_in_other_axes(meant, given.gravity), MUCH_BETTER * bar)
     best = min(one or both, key=_unlikely, default=None)
-    return best if best is not None and not outdone(best, view, given.gravity) else None
+    lost = best is None or outdone(best, view, given.gravity) or _reordered(recording, view, given, best)
+    return None if lost else best
+
+
+def _reordered(recording: Recording, view: Glance, given: Reading, best: Reading) -> bool:
+    """Tell whether force columns in another order explain much more than the best rival does."""
+    order = order_of_forces(recording, view, given.gravity, given.rotation)
+    return order is not None and order.left < MUCH_BETTER * best.fit.force_share
 
 
 def _unlikely(reading: Reading) -> tuple[float, float]:

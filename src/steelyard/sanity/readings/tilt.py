@@ -1,4 +1,4 @@
-"""Tilt: the direction of gravity in W taken from the wrench itself; and axes of the force that are turned or mirrored.
+"""Tilt: the direction of gravity in W taken from the wrench itself; and axes of the force that are turned.
 
 Source: f = m a - R^T u + bias is linear in u = m g, so that the force alone gives the direction without a start value.
 
@@ -19,7 +19,7 @@ from steelyard.identify.cost.left_out import jackknife
 from steelyard.sanity.readings.glance import Glance, Seen
 from steelyard.sanity.readings.static_fit import beside, better_fit, leave_out, solve
 from steelyard.sanity.words import axis_words
-from steelyard.spatial import Rotation, cross_matrix, signed_axes, signed_columns
+from steelyard.spatial import Rotation, cross_matrix
 
 # Directions of W that the rotations show this much less (in variance) than the best one are left as given.
 _BLIND = 0.02
@@ -194,38 +194,3 @@ def blind_tilt(view: Glance, gravity: Array, blind: Array) -> tuple[Finding, ...
         f"from ({axis_words(blind)}) of W, unless the accelerometer's gain is off; the answer does not assume this."
     )
     return (Finding.of("base-tilted", message),)
-
-
-@dataclass(frozen=True, eq=False)
-class Mirror:
-    """How the columns of the force would have to be read, and the share of the force variance that is then left."""
-
-    words: str
-    force_share: float
-
-
-# The 24 (24, 3, 3) that turn a right hand into a left one.
-REFLECTIONS = np.stack([X for X in signed_axes() if np.linalg.det(X) < 0])
-
-
-def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:
-    """Return the exchange of axes and signs that explains the force best; None without rotations or all forces.
-
-    gravity  (3,) [m/s^2] in W
-    sign     that of the mass as read, 0 where it is not sure
-    """
-    if view.rotation is None or any(view.dead[3:]):
-        return None
-    seen = view.still.seen(gravity, view.rotation)
-    force, down = force_and_weight(seen, sign)
-    # force = X m down: the trace with X is largest for the right one.
-    X = max(REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))
-    _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)
-    return Mirror(in_words(X, "F"), share)
-
-
-def in_words(X: Array, letter: str) -> str:
-    """Say what columns must be read as whose numbers are X (3, 3) times those meant: "Fx = -Fy, Fy = .."."""
-    # meant_k = sum_i X_ik read_i
-    pairs = zip("xyz", signed_columns(X.T, letter), strict=True)
-    return ", ".join(f"{letter}{name} = {read}" for name, read in pairs)

@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, frozen
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.readings.glance import Glance, Seen, glance, in_axes
 from steelyard.sanity.readings.levers import by_motion
+from steelyard.sanity.readings.orders import Order, likeliest, orders
 from steelyard.sanity.readings.rivals import BESIDE, Reading, best_rival, misread_rotations, outdone, reading_of
 from steelyard.sanity.readings.rivals import MUCH_BETTER as RIVAL_BETTER
 from steelyard.sanity.readings.static_fit import columns, fit, solve
-from steelyard.sanity.readings.tilt import REFLECTIONS, in_words
 from steelyard.sanity.words import unexplained
 
 # Forces must fit so well before torques are judged; torques may be in another order where they leave more than the
@@ -30,10 +30,17 @@ FORCE, BAD, WELL = 0.1, 0.02, 0.1
 TOLD = 0.01
 # Another order must leave this share of what the order as given leaves.
 MUCH_BETTER = 0.1
+# The force tells the sign of torques beyond so many standard deviations.
+SURELY = 5.0
 _FEWEST_ROWS = 6
 # The ratio of both first moments must be known so well, and they lie so nearly along one line.
 SURE, ALONG = 0.05, 0.2
-REMEDY = "Check order and signs of the torque columns in the description."
+OPPOSED = Finding(
+    "force-unit",
+    "The torques have the sign opposite to that of the forces: what turns shows the centre of mass on the other side "
+    "of S. The answer assumes the sign of the forces.",
+    "Turn the sign of the torques round where they are logged.",
+)
 WHICH = "Check order, form, unit and sense of the rotation, and the frame of the torque."
 ABOUT_S = "Take position x force away from the torques, all in the axes of W, or log the wrench at the sensor."
 
@@ -57,15 +64,16 @@ def examine_torques(recording: Recording, view: Glance, reading: Reading) -> tup
     moment, _, share = solve(turned, seen.wrench[:, :3], view.block)
     if force_share > FORCE:
         return recording, ()
-    felt = force[1:4] if seen.lever is not None else np.zeros(3)
+    felt, felt_std = (force[1:4], force_std[1:4]) if seen.lever is not None else (np.zeros(3), np.zeros(3))
     if share > BAD:
         otherwise, findings = _elsewhere(recording, view, seen, turned, share, reading)
-        findings = findings or _ordered(view, seen, turned, share, felt)
+        if not findings:
+            otherwise, findings = _ordered(recording, view, reading, share, felt, felt_std)
         if findings:
             return otherwise, findings
     if share >= WELL or seen.lever is None:
         return recording, ()
-    ratio = _ratio(felt, float(np.linalg.norm(force_std[1:4])), moment[:3])
+    ratio = _ratio(felt, float(np.linalg.norm(felt_std)), moment[:3])
     if ratio is None:
         return recording, ()
     # The other sign looks like positions of a tip as far behind the centre of mass: all rows tell them apart later.
@@ -115,19 +123,30 @@ def _in_other_axes(view: Glance, turned: Array, reading: Reading) -> tuple[float
     return left, f"the torques are in the axes of {'W (the base)' if 'torque' in other.world else 'S'}"
 
 
-def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array) -> tuple[Finding, ...]:
-    """Return what says in which order and sign torque columns fit; `felt` (3,) is the first moment by the force."""
-    tried = [(X, *solve(turned, seen.wrench[:, :3] @ X, view.block)) for X in REFLECTIONS]
-    X, moment, _, left = min(tried, key=lambda found: found[3])
-    if left > MUCH_BETTER * share:
-        return ()
+def _ordered(
+    recording: Recording, view: Glance, reading: Reading, share: float, felt: Array, std: Array
+) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with torque columns in the order and sign that fit, and what is said of them.
+
+    felt, std  (3,) first moment by the force, with its standard deviation
+    """
+
+    def along(order: Order) -> float:
+        moment = order.solution[:3]
+        side = float(moment @ felt)
+        return side if abs(side) > SURELY * float(np.linalg.norm(moment * std)) else 0.0
+
     # Either sign fits as well: the force decides, or else fewer changes are likelier.
-    side = float(moment[:3] @ felt) or float(X.sum())
-    text = (
-        f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, "
-        f"{unexplained(left, share)}; the answer does not assume this."
-    )
-    return (Finding("force-unit", text, REMEDY, left_in=True),)
+    ways = orders(recording, view, "torque", reading.gravity, reading.rotation)
+    found = likeliest([way.times(float(np.sign(along(way) or way.axes.sum()))) for way in ways])
+    if found.left > MUCH_BETTER * share:
+        return recording, ()
+    # Of a wrench in W a turn about gravity may be one of W itself: forces at rest do not show it.
+    found = replace(found, sure=found.sure and not ("torque" in view.world and np.linalg.det(found.axes) > 0))
+    doubt = ""
+    if not along(found):
+        doubt = "; the other sign of all three fits as well, with the centre of mass beyond the origin of S"
+    return found.put_right(recording) if found.sure else recording, (found.finding(share, doubt),)
 
 
 def _ratio(felt: Array, spread: float, moment: Array) -> tuple[float, float] | None:
@@ -145,13 +164,14 @@ def _ratio(felt: Array, spread: float, moment: Array) -> tuple[float, float] | N
 
 def opposed(ratio: float, std: float) -> tuple[Finding, ...]:
     """Return what is said where first moments by force and by torque, in this ratio, have opposite signs."""
-    if abs(ratio + 1) >= 0.1 + 3 * std:
-        return ()
-    text = (
-        "The torques have the sign opposite to that of the forces: what turns shows the centre of mass on the "
-        "other side of S. The answer does not assume this."
+    return (OPPOSED,) if abs(ratio + 1) < 0.1 + 3 * std else ()
+
+
+def turned_round(recording: Recording) -> Recording:
+    """Return the recording with torques of the other sign."""
+    return recording.changed(
+        lambda s: s.with_channels(torque=frozen(-s.channels["torque"])) if "torque" in s.channels else s
     )
-    return (Finding("force-unit", text, REMEDY, left_in=True),)
 
 
 def examine_swapped(recording: Recording, view: Glance) -> tuple[Recording, tuple[Finding, ...]]:
