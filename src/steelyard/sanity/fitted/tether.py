@@ -27,7 +27,8 @@ from steelyard.sanity.words import axis_words, shortly
 from steelyard.spatial import cross_matrix
 
 # It is seen where its stiffness, added up over the axes, is beyond so many standard deviations by leaving out
-# stretches, and it leaves so much less of what lasts for a second: made logs without one keep 0.56 and more.
+# stretches, and it leaves so much less of what lasts for a second: made logs without one keep 0.56 and more, but for
+# tilted ones.
 SURE, SLOWLY = 5.0, 0.5
 # ... and where no point is known yet that it pulls at, beyond so many.
 LIKELY = 3.0
