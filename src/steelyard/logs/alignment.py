@@ -51,6 +51,7 @@ class Aligned:
     delays_s       stream -> its stamps are late by this much against the wrench clock [s], given or found
     delays_std_s   stream -> standard deviation [s], 0 where given
     rotation       (N,) S to W at the rows, None without
+    position       (N, 3) [m] of the origin of S in W, None without
     mounts         stream -> how its accelerometer sits on S
     acceleration_from   "linear_acceleration", "linear_velocity", "position", "specific_force" or "none"
     left_out       (K, 2) [s] intervals on the wrench clock that were left out
@@ -66,6 +67,7 @@ class Aligned:
     acceleration_from: str = "none"
     left_out: Array = field(default_factory=lambda: np.zeros((0, 2)))
     notes: tuple[str, ...] = ()
+    position: Array | None = None
 
     @property
     def wrench_late_s(self) -> float:
@@ -132,6 +134,7 @@ def _align_timed(given: Prepared, unsteady: int = 0, jumped: tuple[Placed, ...] 
         given.source,
         taps,
         (*say.gaps(given.recording.streams, jumped), *say.notes(clocks, given.source)),
+        motion.position,
     )
 
 

@@ -36,6 +36,7 @@ class Motion:
     acceleration           (M, 3) classical, without gravity; zero where `measured` is False
     acceleration_variance, alpha_variance   (M,) per axis
     measured               the acceleration comes from a channel, not from a guess
+    position               (M, 3) [m] of the S origin in W, None without
     """
 
     gravity: Array | None
@@ -47,6 +48,7 @@ class Motion:
     alpha_variance: Array
     acceleration_variance: Array
     measured: bool
+    position: Array | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +141,16 @@ class Kinematics:
         elif self.place.any():
             acceleration = acceleration - lever_acceleration(omega, alpha, self.place)
             variance = variance + float(self.place @ self.place) * alpha_variance
-        return Motion(gravity, turn, omega, alpha, velocity, acceleration, alpha_variance, variance, measured)
+        position = self._position(time, delays, turn)
+        return Motion(gravity, turn, omega, alpha, velocity, acceleration, alpha_variance, variance, measured, position)
+
+    def _position(self, time: Array, delays: Delays, turn: Rotation | None) -> Array | None:
+        """Return where (M, 3) [m] the S origin is in W; None without positions, or where only turns tell it."""
+        channel = self.channels.get("position")
+        if channel is None or (turn is None and self.place.any()):
+            return None
+        told = channel.at(time, delays)[0][:, 0]
+        return told if turn is None else np.asarray(told - turn.apply(self.place))
 
     def _turning(self, time: Array, delays: Delays) -> tuple[Rotation | None, Array, Array, Array]:
         """Return rotation, angular velocity and acceleration (M, 3) in S, and the variance (M,) of the latter."""

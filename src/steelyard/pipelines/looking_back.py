@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from steelyard.check import Array
 from steelyard.findings import Finding, codes, other_than
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.room_bias import without
@@ -22,12 +23,15 @@ from steelyard.sanity.fitted.gravity import levelled
 from steelyard.sanity.fitted.load_motion import examine_masses, examine_motion
 from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
 from steelyard.sanity.fitted.sensor_matrix import examine_sensor
+from steelyard.sanity.fitted.tether import Tether
 from steelyard.sanity.fitted.yielding import allow_filter, allow_sag, allow_softness
 
 # A sensor that is said to be tared is not where chance gives such a bias less often than this.
 UNTARED = 1e-6
 # Where an acceleration comes from that does not see the arm's structure bend.
 ENCODERS = ("position", "linear_velocity")
+# A share of the weight that changes the answer in proportion.
+SMALL = 0.05
 MAYBE_PLAY = "the sensor may have play where a delay was found: the bars hold the difference"
 
 
@@ -45,7 +49,8 @@ def looked_back(
         load, estimate = load.drifting(drift.settling).followed()
         estimate = estimate.noted(f"{DRIFT_ALLOWED}, {drift.way}, as the log shows (most surely {drift.surest_words})")
     late = (*late, *of_answer(load.log, estimate, recording))
-    if not rows.unmeasured:
+    # What pulls along gravity is weight that is not accelerated.
+    if not rows.unmeasured and rows.tether is None:
         late = (*late, *examine_masses(load.log, (*before, *late)))
     if load.shape is None:
         late = examine_wrench_unit(load.log, estimate, load.of, before, late)
@@ -78,7 +83,20 @@ def corrections_allowed(load: Load, estimate: Estimate, rows: FitRows) -> Estima
         others += [levelled(log, rotation, gravity, rows.aligned.acceleration_from) for gravity in pulls]
     if rows.unplayed is not None:
         estimate = estimate.noted(MAYBE_PLAY)
+    if rows.tether is not None and rotation is not None:
+        estimate = _allowing_tether(load, estimate, rows.tether, rotation)
     return estimate.allowing(*(load.of(other).parameters.vector - estimate.parameters.vector for other in others))
+
+
+def _allowing_tether(load: Load, estimate: Estimate, tether: Tether, rotation: Array) -> Estimate:
+    """Return the estimate with bars that hold how well the pull of a hose is known; rotation (N, 3, 3) turns S into W.
+
+    What it may pull along gravity may be more than the load weighs: a small share of it tells what the whole does.
+    """
+    weight = estimate.mass * float(np.linalg.norm(load.log.gravity, axis=1).mean())
+    share = min(1.0, SMALL * weight / tether.doubt)
+    other = load.of(tether.doubted(load.log, rotation, share)).parameters.vector
+    return estimate.allowing((other - estimate.parameters.vector) / share, *tether.moved.T)
 
 
 def pulled(
@@ -90,7 +108,7 @@ def pulled(
     """
     rotation = rotation_of(load.log, rows.aligned)
     other = stands_aside("room bias", known) or any(f.left_in for f in known)
-    if other or rows.room is not None or rotation is None or load.options.gravity != "given":
+    if other or rows.room is not None or rows.tether is not None or rotation is None or load.options.gravity != "given":
         return ()
     seen, size = room_fit(load.log, rotation, recording.gravity, load.bias.drift), np.linalg.norm(recording.gravity)
     if seen is None or not seen.pulls or np.linalg.norm(seen.force) < size * estimate.std[0]:
@@ -121,7 +139,8 @@ def of_sensor_and_body(
     known  all that was found so far
     """
     estimate, found = examine_sensor(load.log, recording, estimate, known, load.bias.drift)
-    if not rows.unmeasured:
+    # What a hose leaves beside its stiffness goes with the place, and so with accelerations.
+    if not rows.unmeasured and rows.tether is None:
         found = (*found, *examine_motion(load.log, (*known, *found)))
     if load.shape is None:
         size, noise = float(np.linalg.norm(recording.gravity)), row_noise(load.log, recording, "torque")

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array, Mask
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.check import Mask
+from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding, codes, other_than
 from steelyard.identify.fit import Bias
 from steelyard.identify.noise_levels import with_declared, without_dead
@@ -27,10 +27,11 @@ from steelyard.sanity.after import rotation_of
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.biases import SeenRoomBias, examine_room_bias
 from steelyard.sanity.fitted.full_fit import force_left
-from steelyard.sanity.fitted.gravity import FittedGravity, fitted_gravity, levelled
+from steelyard.sanity.fitted.gravity import FittedGravity, as_levelled
 from steelyard.sanity.fitted.misplaced import Misplaced, examine_place, misplaced, of_sensor
 from steelyard.sanity.fitted.play import Play, lasts, play
 from steelyard.sanity.fitted.sensor_matrix import turn_of
+from steelyard.sanity.fitted.tether import Tether, examine_tether
 from steelyard.sanity.holding.consensus import FINE
 from steelyard.sanity.holding.contact import agreeing
 from steelyard.sanity.holding.load_change import small_slip
@@ -45,6 +46,8 @@ ROUNDS, SETTLED = 3, 1e-3
 MEASURED = "specific_force"
 # Findings before the fit that say that rows in motion carry another mass than rows at rest.
 UNLIKE_ONE_BODY = {"motion-mismatch", "weight-compensated"}
+# ... and for which the pull of a hose or a cable passes, as for another direction of gravity.
+LIKE_A_PULL = ("base-tilted", *UNLIKE_ONE_BODY)
 # Stretches of time (start, end) [s].
 Spans = tuple[tuple[float, float], ...]
 # So often clocks are found anew without the time of a hand.
@@ -71,6 +74,7 @@ class FitRows:
     place       the point whose positions the recording has, where it is not the origin of S
     maybe       the same where that is not beyond doubt: the rows are those of the origin
     room        a bias that keeps its direction in the room, which the rows are without
+    tether      a hose, cable or spring that pulls, without which the rows are
     play        play of the sensor, which the rows are without
     unplayed    rows without play, where what one body leaves may be play as well as a delay
     units       findings that forces and torques do not belong together, where such a point would be no point
@@ -86,6 +90,7 @@ class FitRows:
     maybe: Misplaced | None = None
     units: tuple[Finding, ...] = ()
     room: SeenRoomBias | None = None
+    tether: Tether | None = None
     play: Play | None = None
     unplayed: MotionLog | None = None
 
@@ -93,6 +98,11 @@ class FitRows:
     def kept(self) -> float:
         """The share of the aligned rows that is fitted."""
         return len(self.log) / max(len(self.aligned.log), 1)
+
+    @property
+    def causes(self) -> tuple[Misplaced | SeenRoomBias | Tether | Play, ...]:
+        """What spoiled the whole log, and was put right."""
+        return tuple(cause for cause in (self.place, self.room, self.tether, self.play) if cause is not None)
 
     @property
     def delayed(self) -> bool:
@@ -229,16 +239,32 @@ class Reading:
         return min(found, key=_cost, default=rows)
 
     def _as_aligned(self, how: AlignOptions) -> FitRows:
-        """Return the rows to fit, aligned as said, and without a bias that keeps its direction in the room."""
+        """Return the rows to fit, aligned as said, without the pull of a hose, or a bias that stays put in the room.
+
+        Either looks like a hand in some poses: whether there is one shows without it.
+        """
         aligned, level = self._aligned(how)
         log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes(self.before))
         rows = self._held(FitRows(log, aligned, level, unmeasured, ()))
-        room, rotation = self._room_bias(rows, log), rotation_of(log, aligned)
+        tether, rotation = self._tether(rows, log), rotation_of(log, aligned)
+        if tether is not None:
+            whole = FitRows(tether.put_right(log, aligned), aligned, level, unmeasured, ())
+            return replace(self._held(whole), tether=tether)
+        room = self._room_bias(rows, log)
         if room is None or rotation is None:
             return rows
-        # Such a bias looks like a hand in some poses: whether there is one shows without it.
         whole = FitRows(room.put_right(log, rotation), aligned, level, unmeasured, ())
         return replace(self._held(whole), room=room)
+
+    def _tether(self, rows: FitRows, log: MotionLog) -> Tether | None:
+        """Return what pulls as a hose does in the rows kept, or in all of `log`; else None."""
+        if self.options.gravity != "given" or rows.unmeasured or self.left_in:
+            return None
+        recording, drift = self.recording, self.options.drift
+        turned = "wrench-sign-flipped" in codes(self.before) or not recording.sign_said
+        some = (rows.log, without_dead(with_declared(log, recording.noise)))[: 1 + bool(rows.touched)]
+        found = (examine_tether(each, rows.aligned, recording.gravity, turned, drift) for each in some)
+        return next((tether for tether in found if tether is not None), None)
 
     def _room_bias(self, rows: FitRows, log: MotionLog) -> SeenRoomBias | None:
         """Return the bias that keeps its direction in the room in the rows kept, or in all of `log`; else None."""
@@ -283,7 +309,7 @@ class Reading:
         aligned = align(self.recording, how)
         if any(how.place) and (aligned.acceleration_from == MEASURED or aligned.log.time is None):
             aligned = replace(aligned, log=of_sensor(aligned.log, np.array(how.place)))
-        return (aligned, None) if self.options.gravity == "given" else _levelled(aligned, self.recording.gravity)
+        return (aligned, None) if self.options.gravity == "given" else as_levelled(aligned, self.recording.gravity)
 
 
 def rows_as_given(
@@ -291,7 +317,8 @@ def rows_as_given(
 ) -> tuple[Recording, tuple[Finding, ...], FitRows]:
     """Return recording, findings before the fit, and rows; with what rows alone tell put right.
 
-    Torques may have the other sign, and a bias may have passed for a tilt: then gravity is as given.
+    Torques may have the other sign; a bias may have passed for a tilt, and then gravity is as given. Where a hose or a
+    cable pulls, what it passed for is not said.
 
     given  the recording before it was examined
     """
@@ -299,12 +326,14 @@ def rows_as_given(
     if OPPOSED in rows.units:
         recording, before = turned_round(recording), (*before, OPPOSED)
         recording, rows = Reading(recording, before, options).without_play()
-    if "base-tilted" not in codes(before):
+    tilted = "base-tilted" in codes(before)
+    if not tilted and (rows.tether is None or not codes(before) & set(LIKE_A_PULL)):
         return recording, before, rows
-    level = replace(recording, gravity=given.gravity, gravity_std=given.gravity_std)
-    others = other_than(before, "base-tilted")
+    level = replace(recording, gravity=given.gravity, gravity_std=given.gravity_std) if tilted else recording
+    others = other_than(before, *(("base-tilted",) if rows.tether is None else LIKE_A_PULL))
     again = Reading(level, others, options).rows_to_fit()
-    return (recording, before, rows) if again.room is None else (level, others, again)
+    found = again.tether is not None or (tilted and again.room is not None)
+    return (level, others, again) if found else (recording, before, rows)
 
 
 def _cost(rows: FitRows) -> float:
@@ -324,15 +353,3 @@ def since_start(log: MotionLog, recording: Recording) -> MotionLog:
     """Return the log with times [s] since the first row of the wrench, as findings tell them."""
     start = next((s.time[0] for s in recording.streams if "force" in s.channels and s.time is not None), 0.0)
     return log if log.time is None else replace(log, time=log.time - start)
-
-
-def _levelled(aligned: Aligned, gravity: Array) -> tuple[Aligned, FittedGravity]:
-    """Return the log for the direction of gravity that it shows itself, and that; `gravity` (3,) as it was given."""
-    if aligned.rotation is None:
-        raise BadValue('gravity "unknown" needs the rotation of the sensor; the log has none. Add a rotation stream.')
-    rotation = aligned.rotation.matrix
-    found = fitted_gravity(aligned.log, rotation, gravity, aligned.acceleration_from)
-    if found is None or len(found.tilts) < 2:
-        raise CannotAnswer("The log does not show the direction of gravity: turn the sensor about two different axes.")
-    log = levelled(aligned.log, rotation, found.gravity, aligned.acceleration_from)
-    return replace(aligned, log=log), found

@@ -52,7 +52,7 @@ class Noticed:
 def noticed_before(found: tuple[Finding, ...], recording: Recording, rows: FitRows) -> tuple[Finding, ...]:
     """Return what was found before the fit, in words for who has no description, and what the rows to fit show."""
     found = found if recording.described else tuple(finding.instead(BARE) for finding in found)
-    return (*found, *rows.units, *(cause.finding for cause in (rows.place, rows.room, rows.play) if cause is not None))
+    return (*found, *rows.units, *(cause.finding for cause in rows.causes))
 
 
 def sign_found(found: tuple[Finding, ...], recording: Recording) -> tuple[tuple[Finding, ...], tuple[str, ...]]:

@@ -68,15 +68,21 @@ def _base_tilted(log: MotionLog, aligned: Aligned, gravity: Array) -> tuple[Find
 
 def rotation_of(log: MotionLog, aligned: Aligned) -> Array | None:
     """Return rotations (N, 3, 3) S to W at the rows of a log that may hold fewer rows than `aligned` gave."""
-    if aligned.rotation is None:
-        return None
-    matrix = aligned.rotation.matrix
-    if len(log) == len(matrix):
-        return matrix
+    return None if aligned.rotation is None else _at_rows(log, aligned, aligned.rotation.matrix)
+
+
+def position_of(log: MotionLog, aligned: Aligned) -> Array | None:
+    """Return positions (N, 3) [m] of S in W at the rows of a log that may hold fewer rows than `aligned` gave."""
+    return None if aligned.position is None else _at_rows(log, aligned, aligned.position)
+
+
+def _at_rows(log: MotionLog, aligned: Aligned, values: Array) -> Array | None:
+    if len(log) == len(values):
+        return values
     if log.time is None or aligned.log.time is None:
         return None
     index = np.searchsorted(aligned.log.time, log.time)
-    return np.asarray(matrix[np.minimum(index, len(matrix) - 1)])
+    return np.asarray(values[np.minimum(index, len(values) - 1)])
 
 
 def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...]:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.logs.alignment import Aligned
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.words import direction_words
@@ -87,6 +89,21 @@ def levelled(log: MotionLog, rotation: Array, gravity: Array, acceleration_from:
     if acceleration_from != "specific_force":
         return replace(log, gravity=turned)
     return replace(log, gravity=turned, acceleration=log.acceleration - log.gravity + turned)
+
+
+def as_levelled(aligned: Aligned, gravity: Array) -> tuple[Aligned, FittedGravity]:
+    """Return the log for the direction of gravity that it shows itself, and that; `gravity` (3,) as it was given.
+
+    Raises BadValue without rotations, CannotAnswer where the log does not show it.
+    """
+    if aligned.rotation is None:
+        raise BadValue('gravity "unknown" needs the rotation of the sensor; the log has none. Add a rotation stream.')
+    rotation = aligned.rotation.matrix
+    found = fitted_gravity(aligned.log, rotation, gravity, aligned.acceleration_from)
+    if found is None or len(found.tilts) < 2:
+        raise CannotAnswer("The log does not show the direction of gravity: turn the sensor about two different axes.")
+    log = levelled(aligned.log, rotation, found.gravity, aligned.acceleration_from)
+    return replace(aligned, log=log), found
 
 
 def _across(gravity: Array) -> Array:

@@ -1,0 +1,238 @@
+"""A hose, cable or spring that hangs on what is held: it pulls harder the farther it is drawn out.
+
+At p the robot bears f = f0 + K (p - p0) in W against it, with p the point of the load that it hangs on, p0 the middle
+of the motion, and K symmetric, no axis of which a spring has below zero. What of f0 points up is weight to all poses;
+acceleration alone tells it from mass, and how stiffly it is held says how large it may be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.findings import Finding
+from steelyard.identify.room_bias import OF_ACCELERATION
+from steelyard.inertia import forms
+from steelyard.logs.alignment import Aligned
+from steelyard.logs.log import MotionLog
+from steelyard.sanity.after import position_of, rotation_of
+from steelyard.sanity.fitted.full_fit import CALM, NOISE, FullFit, Rows, moves, noise_share
+from steelyard.sanity.fitted.gravity import fitted_gravity
+from steelyard.sanity.fitted.misplaced import misplaced
+from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
+from steelyard.sanity.words import axis_words, shortly
+from steelyard.spatial import cross_matrix
+
+# It is seen where its stiffness, added up over the axes, is beyond so many standard deviations by leaving out
+# stretches, and it leaves so much less of what lasts for a second: made logs without one keep 0.56 and more, but for
+# tilted ones.
+SURE, SLOWLY = 5.0, 0.5
+# ... and where no point is known yet that it pulls at, beyond so many.
+LIKELY = 3.0
+# No axis may be pushed away by more than this share of how the stiffest is drawn back: errors of a sensor or an arm
+# that come back with the pose have either sign.
+PUSHED = 0.2
+# It leaves so much less of the squared residual than gravity along another direction, which has fewer numbers.
+BETTER = 0.8
+# [m] Nothing hangs farther from the sensor. How far it may be drawn out, where nothing else tells its pull.
+FARTHEST, DRAWN = 1.0, 1.0
+# Combinations that a body and a bias mimic to this share of their squares are not told.
+TOLD = 1e-5
+# The point is sought anew by at most so much at once [m], until it moves by less.
+ROUNDS, STEP, SETTLED = 10, 0.05, 1e-3
+# A steady force, a symmetric stiffness, a point.
+NUMBERS = 12
+# Symmetric matrices (6, 3, 3).
+_STIFFNESSES = forms.inertia_matrix(np.eye(10)[4:])
+_REMEDY = (
+    "Take the hose or cable off, or fix it to the arm before the sensor, and record again; else weigh a known mass in "
+    "the same motion."
+)
+_TOO_HARD = (
+    "Something hangs on the load and pulls, as a hose, a cable or a spring balancer does, so hard that the sign of the "
+    "wrench does not show: taken for that of a weight, it would push away what it hangs on. Take it off, or fix it to "
+    "the arm before the sensor, and record again; say the sign of the wrench in the description."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Tether:
+    """What a log shows of a tether.
+
+    steady     (3,) [N] what the robot bears against it at the middle, in W
+    doubt      [N] standard deviation of that along gravity
+    stiffness  (3, 3) [N/m] in W
+    point      (3,) [m] in S, where it pulls
+    middle     (3,) [m] of the positions of S in W
+    up         (3,) against gravity in W
+    moved      (10, 10) columns: by how much how well it is known may move the parameters
+    """
+
+    steady: Array
+    doubt: float
+    stiffness: Array
+    point: Array
+    middle: Array
+    up: Array
+    moved: Array
+
+    def put_right(self, log: MotionLog, aligned: Aligned) -> MotionLog:
+        """Return a log that holds rows of `aligned` without its pull."""
+        rotation, position = rotation_of(log, aligned), position_of(log, aligned)
+        if rotation is None or position is None:
+            return log
+        place = position - self.middle + rotation @ self.point
+        return self._without(log, rotation, self.steady + place @ self.stiffness)
+
+    def doubted(self, log: MotionLog, rotation: Array, share: float) -> MotionLog:
+        """Return the log without so much of one standard deviation of its pull along gravity."""
+        return self._without(log, rotation, np.broadcast_to(share * self.doubt * self.up, (len(log), 3)))
+
+    def _without(self, log: MotionLog, rotation: Array, force: Array) -> MotionLog:
+        in_sensor = np.einsum("nji,nj->ni", rotation, force)
+        return replace(log, wrench=log.wrench - np.concatenate([np.cross(self.point, in_sensor), in_sensor], 1))
+
+    @property
+    def finding(self) -> Finding:
+        """What is said of it."""
+        values, axes = np.linalg.eigh(self.stiffness)
+        values = np.maximum(values, 0.0)
+        pull = -self.steady + 0.0
+        text = (
+            "Something hangs on what is held and pulls harder the farther it is drawn out, as a hose, a cable or a "
+            f"spring does: by {values[2]:.2g} N/m along ({axis_words(axes[:, 2])}) of W and {values[0]:.2g} to "
+            f"{values[1]:.2g} N/m across that, at ({shortly(1e3 * self.point)}) mm in S, and in the middle of "
+            f"the motion with ({shortly(pull)}) N along x, y, z of W. The answer is without it. Acceleration "
+            f"alone tells its force along gravity from weight: {self.doubt:.2g} N of doubt are in the bar of the mass."
+        )
+        return Finding("contact", text, _REMEDY)
+
+
+def examine_tether(log: MotionLog, aligned: Aligned, gravity: Array, turned: bool, drift: bool) -> Tether | None:
+    """Return the tether that a log shows where it is sure, and explains more than any other cause; else None.
+
+    aligned  of which the log holds rows     gravity  (3,) [m/s^2] in W     drift  whether the bias may grow with time
+    turned   whether the sign of the wrench was chosen so that the mass is above zero
+
+    Raises CannotAnswer where that sign is wrong since a tether pulls the load up harder than it weighs.
+    """
+    rotation, position, source = rotation_of(log, aligned), position_of(log, aligned), aligned.acceleration_from
+    rows, pick = Rows.of(log, drift)
+    if rotation is None or position is None or not rows.split:
+        return None
+    middle, size = position.mean(0), float(np.linalg.norm(gravity))
+    up, level = -gravity / size, np.linalg.svd(gravity[None])[2][1:].T
+    # What pulls along gravity is weight without inertia: a log that moves calmly enough tells it apart.
+    noise = noise_share(log) if log.noise is not None and moves(log) else np.inf
+    ways = np.column_stack([level, up]) if noise < CALM else level
+    found = _sought(rows, rotation[pick], position[pick] - middle, ways)
+    if found is None or not _best(found, log, rotation, gravity, source, drift):
+        return None
+    if np.trace(found.stiffness) < 0:
+        if turned:
+            raise CannotAnswer(_TOO_HARD)
+        return None
+    # Beforehand it pulls along gravity as hard as to either side, and as where it is drawn out by so much.
+    across = level @ level.T @ found.steady
+    usual = float(np.hypot(np.linalg.norm(across) / np.sqrt(2), DRAWN * up @ found.stiffness @ up))
+    std, moved = found.upward(size * (OF_ACCELERATION + NOISE * noise) * found.fit.phi[0])
+    share = 1 / (1 + (usual / std) ** 2)  # of what is known beforehand
+    steady = across + (1 - share) * (up @ found.steady) * up
+    return Tether(steady, float(np.sqrt(share)) * usual, found.stiffness, found.point, middle, up, moved)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sought:
+    """What fits best: steady force (3,), stiffness (3, 3) and point (3,) as of a `Tether`.
+
+    fit   the fit of those combinations of its numbers that are told, in the columns of `told` (n, k)
+    left  squared residual beside that without a tether
+    """
+
+    steady: Array
+    stiffness: Array
+    point: Array
+    fit: FullFit
+    told: Array
+    left: float
+
+    def upward(self, doubted: float) -> tuple[float, Array]:
+        """Return the standard deviation [N] of the force along gravity, infinite where no acceleration tells it, and
+        in columns (10, 10) by how much all else that is known of the tether may move the parameters.
+
+        doubted  [N] by how much accelerations may be wrong about it
+        """
+        own, covariance = self.fit.own, self.fit.covariance[:10, :10]
+        along, std = self.told[2], np.inf
+        if self.told.shape == (NUMBERS, NUMBERS):
+            variance = max(float(along @ self.fit.extra_covariance @ along), 1e-300)
+            follow = self.fit.covariance[:10, own:] @ along
+            covariance, std = (
+                covariance - np.outer(follow, follow) / variance,
+                float(np.hypot(np.sqrt(variance), doubted)),
+            )
+        values, axes = np.linalg.eigh(covariance)
+        return std, axes * np.sqrt(np.maximum(values, 0.0))
+
+
+def _best(found: _Sought, log: MotionLog, rotation: Array, gravity: Array, source: str, drift: bool) -> bool:
+    """Tell whether a tether leaves less than a turned sensor, unlike gains, another point, or tilted gravity."""
+    others = sensor_matrix(log, drift), misplaced(log, drift)
+    tilted = fitted_gravity(log, rotation, gravity, source)
+    best = all(other is None or found.left < other.left for other in others)
+    return best and (tilted is None or found.left < BETTER * tilted.left)
+
+
+def _sought(rows: Rows, R: Array, p: Array, ways: Array) -> _Sought | None:
+    """Return the tether that fits best; None where none is sure.
+
+    R, p  (N, 3, 3) S to W and (N, 3) [m] from the middle at the rows
+    ways  (3, k) axes in W along which a steady force is told
+    """
+    once, count = rows.solve(), ways.shape[1]
+    numbers, slow = np.zeros(count + 9), rows.slowly(once)
+    trace = np.concatenate([np.zeros(count), np.einsum("kii->k", _STIFFNESSES), np.zeros(3)])
+    for turn in range(ROUNDS):
+        columns, offset = _linear(numbers, R, p, ways)
+        if not turn:
+            columns = columns[:, :, :-3]  # with no force yet no point is told
+        told = rows.told(columns, TOLD)
+        if not told.size or not slow:
+            return None
+        columns, shifted = columns @ told, replace(rows, values=rows.values - offset)
+        fit, told = shifted.solve(columns, jackknife=True), np.pad(told, ((0, len(numbers) - len(told)), (0, 0)))
+        before, numbers = numbers, told @ fit.extra
+        spread = float(np.sqrt(trace @ told @ fit.extra_covariance @ told.T @ trace))
+        if abs(trace @ numbers) < (SURE if turn else LIKELY) * spread:
+            return None
+        step = numbers[-3:] - before[-3:]
+        numbers[-3:] = before[-3:] + np.clip(step, -STEP, STEP)
+        if turn and np.linalg.norm(step) < SETTLED:
+            break
+    steady, stiffness, point = _apart(numbers, ways)
+    values = np.linalg.eigvalsh(stiffness * np.sign(np.trace(stiffness)))
+    pushes, far = values[0] < -PUSHED * values[2], np.linalg.norm(point) > FARTHEST
+    if pushes or far or shifted.slowly(fit, columns) > SLOWLY * slow:
+        return None
+    return _Sought(steady, stiffness, point, fit, told, fit.beside(once))
+
+
+def _apart(numbers: Array, ways: Array) -> tuple[Array, Array, Array]:
+    """Return steady force (3,), stiffness (3, 3) and point (3,) of the numbers (k + 9,) of a tether."""
+    return ways @ numbers[:-9], np.einsum("k,kij->ij", numbers[-9:-3], _STIFFNESSES), numbers[-3:]
+
+
+def _linear(numbers: Array, R: Array, p: Array, ways: Array) -> tuple[Array, Array]:
+    """Return columns (N, 6, k + 9) and offset (N, 6) of the wrench of a tether about its numbers (k + 9,)."""
+    steady, stiffness, point = _apart(numbers, ways)
+    at, back, lever = p + R @ point, np.swapaxes(R, 1, 2), cross_matrix(point)
+    force = np.einsum("nij,nj->ni", back, steady + at @ stiffness)
+    drawn = np.einsum("nij,kjl,nl->nik", back, _STIFFNESSES, at, optimize=True)
+    of_force = np.concatenate([back @ ways, drawn, back @ stiffness @ R], 2)
+    of_torque = lever @ of_force
+    of_torque[:, :, -3:] -= cross_matrix(force)
+    columns = np.concatenate([of_torque, of_force], 1)
+    return columns, np.concatenate([np.cross(point, force), force], 1) - columns @ numbers
