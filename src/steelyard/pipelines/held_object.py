@@ -20,8 +20,8 @@ from steelyard.parts.parts import Parts
 from steelyard.pipelines.load import Load, looked_at, placed
 from steelyard.pipelines.looking_back import corrections_allowed, looked_back, of_sensor_and_body, pulled
 from steelyard.pipelines.options import DEFAULTS, DRIFT_ALLOWED, Options
-from steelyard.pipelines.rows import rows_as_given
 from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, sign_found, told, uncalibrated
+from steelyard.pipelines.told_by_rows import rows_as_given
 from steelyard.sanity.before import examine
 from steelyard.spatial import Pose
 

@@ -10,7 +10,8 @@ from steelyard.logs.drift import SETTLING, STEADILY, settled_course
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.options import DRIFT_ALLOWED, Options
-from steelyard.pipelines.rows import GRAVITY_FOUND, rows_as_given, since_start
+from steelyard.pipelines.rows import GRAVITY_FOUND, since_start
+from steelyard.pipelines.told_by_rows import rows_as_given
 from steelyard.sanity.before import examine
 
 # Residuals this many times those of the answer are not what it was made from.

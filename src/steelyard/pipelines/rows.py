@@ -13,7 +13,7 @@ import numpy as np
 
 from steelyard.check import Mask
 from steelyard.errors import CannotAnswer
-from steelyard.findings import Finding, codes, other_than
+from steelyard.findings import Finding, codes
 from steelyard.identify.fit import Bias
 from steelyard.identify.noise_levels import with_declared, without_dead
 from steelyard.logs.alignment import Aligned, align
@@ -36,7 +36,6 @@ from steelyard.sanity.holding.consensus import FINE
 from steelyard.sanity.holding.contact import agreeing
 from steelyard.sanity.holding.load_change import small_slip
 from steelyard.sanity.one_body import one_body
-from steelyard.sanity.readings.torques import OPPOSED, turned_round
 
 # How the note begins that says which direction of gravity was used.
 GRAVITY_FOUND = "gravity was estimated"
@@ -46,8 +45,6 @@ ROUNDS, SETTLED = 3, 1e-3
 MEASURED = "specific_force"
 # Findings before the fit that say that rows in motion carry another mass than rows at rest.
 UNLIKE_ONE_BODY = {"motion-mismatch", "weight-compensated"}
-# ... and for which the pull of a hose or a cable passes, as for another direction of gravity.
-LIKE_A_PULL = ("base-tilted", *UNLIKE_ONE_BODY)
 # Stretches of time (start, end) [s].
 Spans = tuple[tuple[float, float], ...]
 # So often clocks are found anew without the time of a hand.
@@ -310,30 +307,6 @@ class Reading:
         if any(how.place) and (aligned.acceleration_from == MEASURED or aligned.log.time is None):
             aligned = replace(aligned, log=of_sensor(aligned.log, np.array(how.place)))
         return (aligned, None) if self.options.gravity == "given" else as_levelled(aligned, self.recording.gravity)
-
-
-def rows_as_given(
-    given: Recording, recording: Recording, before: tuple[Finding, ...], options: Options
-) -> tuple[Recording, tuple[Finding, ...], FitRows]:
-    """Return recording, findings before the fit, and rows; with what rows alone tell put right.
-
-    Torques may have the other sign; a bias may have passed for a tilt, and then gravity is as given. Where a hose or a
-    cable pulls, what it passed for is not said.
-
-    given  the recording before it was examined
-    """
-    recording, rows = Reading(recording, before, options).without_play()
-    if OPPOSED in rows.units:
-        recording, before = turned_round(recording), (*before, OPPOSED)
-        recording, rows = Reading(recording, before, options).without_play()
-    tilted = "base-tilted" in codes(before)
-    if not tilted and (rows.tether is None or not codes(before) & set(LIKE_A_PULL)):
-        return recording, before, rows
-    level = replace(recording, gravity=given.gravity, gravity_std=given.gravity_std) if tilted else recording
-    others = other_than(before, *(("base-tilted",) if rows.tether is None else LIKE_A_PULL))
-    again = Reading(level, others, options).rows_to_fit()
-    found = again.tether is not None or (tilted and again.room is not None)
-    return (level, others, again) if found else (recording, before, rows)
 
 
 def _cost(rows: FitRows) -> float:
