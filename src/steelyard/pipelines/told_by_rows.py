@@ -24,6 +24,9 @@ def rows_as_given(
 
     given  the recording before it was examined
     """
+    if options.gravity == "unknown":
+        # The fit tells how well it knows the direction, whatever a tilt seen before says of that.
+        recording = replace(recording, gravity_std=given.gravity_std)
     recording, rows = Reading(recording, before, options).without_play()
     if OPPOSED in rows.units:
         recording, before = turned_round(recording), (*before, OPPOSED)
