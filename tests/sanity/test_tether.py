@@ -11,6 +11,7 @@ import steelyard as sy
 from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.recording import Recording
+from steelyard.pipelines.left_over import left_over, of_another_fit
 from steelyard.simulate import hammer
 from steelyard.simulate.motions import Step, StopAndGo
 
@@ -72,6 +73,15 @@ def test_a_sound_log_keeps_its_answer(seed: int, monkeypatch: pytest.MonkeyPatch
     assert "contact" not in found.codes()
     monkeypatch.setattr("steelyard.pipelines.rows.examine_tether", lambda *_: None)
     assert np.array_equal(sy.identify(recording).covariance, found.covariance)
+
+
+def test_residuals_of_all_rows_are_without_it() -> None:
+    """The report kept its pull in them, and took the answer for that of another log."""
+    recording = pulled(hammer.recording(0).recording, "above", 6.0)
+    found = sy.identify(recording)
+    _, left = left_over(recording, found)
+    assert np.sqrt((left[:, 3:] ** 2).mean()) == pytest.approx(found.evidence.residual_force_N, rel=0.1)
+    assert not of_another_fit(found, left)
 
 
 def test_a_slack_one_changes_nothing() -> None:

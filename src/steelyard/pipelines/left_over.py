@@ -33,9 +33,7 @@ def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = 
     found = any(note.startswith(GRAVITY_FOUND) for note in estimate.notes)
     options = Options(gravity="unknown" if found else "given")
     recording, _, rows = rows_as_given(recording, examined, before, options)
-    log = rows.aligned.log
-    if rows.room is not None and rows.aligned.rotation is not None:
-        log = rows.room.put_right(log, rows.aligned.rotation.matrix)
+    log = rows.whole
     vector = estimate.parameters.vector + (0.0 if tool is None else tool.parameters.vector)
     left = log.wrench - log.predicted(vector) - recording.wrench_sign * estimate.wrench_bias
     if any(note.startswith(DRIFT_ALLOWED) for note in estimate.notes) and log.time is not None:

@@ -97,6 +97,16 @@ class FitRows:
         return len(self.log) / max(len(self.aligned.log), 1)
 
     @property
+    def whole(self) -> MotionLog:
+        """All aligned rows, without the pull of a hose, or a bias that stays put in the room."""
+        log = self.aligned.log
+        if self.tether is not None:
+            return self.tether.put_right(log, self.aligned)
+        if self.room is None or self.aligned.rotation is None:
+            return log
+        return self.room.put_right(log, self.aligned.rotation.matrix)
+
+    @property
     def causes(self) -> tuple[Misplaced | SeenRoomBias | Tether | Play, ...]:
         """What spoiled the whole log, and was put right."""
         return tuple(cause for cause in (self.place, self.room, self.tether, self.play) if cause is not None)

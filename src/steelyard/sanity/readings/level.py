@@ -51,8 +51,7 @@ def examine_order(recording: Recording, view: Glance, reading: Reading) -> tuple
     mixed = None
     if _may_be_off(view, reading):
         mixed = order_of_forces(recording, view, reading.gravity, reading.rotation)
-    # Forces in W point down however they are read: misread rotations leave a little, that by chance another order does
-    # not.
+    # Forces in W point down however they are read: the little that misread rotations leave, another order may take up.
     better = MUCH_BETTER**2 if "force" in view.world else MUCH_BETTER
     if mixed is None or mixed.left > min(better * reading.fit.force_share, 0.3):
         return recording, ()
