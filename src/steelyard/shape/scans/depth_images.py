@@ -81,7 +81,7 @@ def height_map(
         for v in range(first, depth.shape[1], stride):
             for m in range(count):
                 line[0, m] = depth[k, v, first + m * stride]
-            _line_of_points(images, k, first, v, stride, low, pitch, line)
+            line_of_points(images, k, first, v, stride, low, pitch, line)
             for m in range(count):
                 i, j, h = line[0, m], line[1, m], line[2, m]
                 if 0 <= i < rows and 0 <= j < columns:
@@ -93,7 +93,7 @@ def height_map(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _line_of_points(images: Images, k: int, first: int, v: int, stride: int, low: Any, pitch: float, line: Any) -> None:
+def line_of_points(images: Images, k: int, first: int, v: int, stride: int, low: Any, pitch: float, line: Any) -> None:
     """Turn the depths in line (3, M) of the pixels of one row into their cell of the grid and height [m].
 
     A pixel without depth has cell -1.
@@ -130,7 +130,7 @@ def held(images: Images, points: Any) -> Any:
     return out
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def normal_of(
     images: Images, k: int, u: int, v: int, a: float, b: float, z: float, step: int, noise: float
 ) -> tuple[bool, float, float, float]:

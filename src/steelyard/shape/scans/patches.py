@@ -15,20 +15,19 @@ from steelyard.shape.scans.scene import WINDOW, Scene
 
 _NORMAL_STEP = 2  # pixels from one whose normal is taken to its neighbours
 _SEEDS = 4  # points that are settled, for each that stays
-_CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
 _CUBE = 8  # pixel widths: points of one cube are looked up in the images one after the other
 _NEARLY = 0.9  # of an object's height: the mean over the cell of its top, its sides included
 
 
 def surfels(scene: Scene, region: Region) -> Array:
     """Return patches (N, 8) of the object and of the table around it."""
-    cell = _CELL * scene.pixel
+    cell = region.grid.pitch
     floor = -4 * scene.sigma - 2 * cell
     layers = int((_top(scene, region) - floor) / cell) + 2
     # Where few images hold an end of it, all of their pixels are needed.
     stride = 1 if region.cut else STRIDE
-    where = region.mask, region.grid.low, region.grid.pitch
-    found = surfel_pass.surfels(scene.images, stride, _NORMAL_STEP, *where, cell, floor, layers, scene.noise)
+    where = region.mask, region.grid.low, cell
+    found = surfel_pass.surfels(scene.images, stride, _NORMAL_STEP, *where, floor, layers, scene.noise)
     found = np.asarray(found[found[:, 7] >= scene.enough])
     if not len(found):
         raise no_surface()

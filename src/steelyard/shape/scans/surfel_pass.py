@@ -2,85 +2,128 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 
-from steelyard.shape.scans.depth_images import Images, lent, normal_of, pixel_of
+from steelyard.shape.scans.depth_images import Images, lent, line_of_points, normal_of, pixel_of
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+class _Cubes(NamedTuple):
+    """The cubes over which pixels are averaged.
+
+    low     (2,) corner of the table [m]; edge of a cube [m]; floor: lowest height looked at [m]
+    number  (I, J) columns of cubes, -1 where nothing is looked at; there are `columns` of them, `layers` cubes high
+    """
+
+    low: Any
+    edge: float
+    floor: float
+    layers: int
+    number: Any
+    columns: int
+
+
+@numba.njit(cache=True, nogil=True)
 def surfels(
-    images: Images, stride: int, step: int, mask: Any, low: Any, pitch: float, cell: float, floor: float, layers: int,
-    noise: float,
-) -> Any:  # fmt: skip
+    images: Images, stride: int, step: int, mask: Any, low: Any, cell: float, floor: float, layers: int, noise: float
+) -> Any:
     """Return patches (N, 8) of surface: mean point, unit normal toward the cameras, pixels and views that saw it.
 
     step    pixels between the neighbours that give a pixel's normal
-    mask    (rows, columns) bool: where on the table to look, `pitch` wide cells from the corner `low` (2,)
-    cell    edge of the cube over which pixels are averaged, apart by the six main directions of their normals [m]
+    mask    (I, J) bool: where on the table to look, cells from the corner `low` (2,)
+    cell    their width, and the edge of the cubes over which pixels are averaged, apart by the six main directions of
+            their normals [m]
     floor   lowest height looked at [m], `layers` cubes up from it
     noise   standard deviation of depth at 1 m; it grows with the square
     """
-    images = lent(images)
-    depth, unit, (fx, fy, cx, cy), R, p = images
-    count, height, width = depth.shape
-    box = _box_of(mask, low, pitch, floor, layers * cell)
-    # Cubes are counted from the corner of the table; the index holds those over the mask, with one to spare.
-    i0, j0 = max(int((box[0, 0] - low[0]) / cell) - 1, 0), max(int((box[0, 1] - low[1]) / cell) - 1, 0)
-    wide, deep = int((box[1, 0] - low[0]) / cell) + 2 - i0, int((box[1, 1] - low[1]) / cell) + 2 - j0
-    index = np.full((6, layers, wide, deep), -1, np.int32)  # neighbours on a level surface lie side by side
-    size = 4096
+    images, width = lent(images), images.depth.shape[2]
+    box, (number, columns) = _box_of(mask, low, cell, floor, layers * cell), _numbered(mask)
+    cubes = _Cubes(low, cell, floor, layers, number, columns)
+    index = np.full(6 * layers * columns, -1, np.int32)  # neighbours on a level surface lie side by side
+    size, n = max(4096, width), 0
     sums, last = np.zeros((size, 8)), np.full(size, -1, np.int32)
-    n = 0
-    for k in range(count):
-        window = _window_of(box, images, k)
-        for v in range(_first(window[2], step, stride), min(height - step, window[3] + 1), stride):
-            b = (v - cy) / fy
-            for u in range(_first(window[0], step, stride), min(width - step, window[1] + 1), stride):
-                z = depth[k, v, u] * unit
-                if z <= 0:
-                    continue
-                a = (u - cx) / fx
-                x = z * (R[k, 0, 0] * a + R[k, 0, 1] * b + R[k, 0, 2]) + p[k, 0]
-                y = z * (R[k, 1, 0] * a + R[k, 1, 1] * b + R[k, 1, 2]) + p[k, 1]
-                i, j = int(np.floor((x - low[0]) / pitch)), int(np.floor((y - low[1]) / pitch))
-                if i < 0 or j < 0 or i >= mask.shape[0] or j >= mask.shape[1] or not mask[i, j]:
-                    continue
-                h = z * (R[k, 2, 0] * a + R[k, 2, 1] * b + R[k, 2, 2]) + p[k, 2]
-                layer = int(np.floor((h - floor) / cell))
-                if layer < 0 or layer >= layers:
-                    continue
-                faces, nx, ny, nz = normal_of(images, k, u, v, a, b, z, step, noise)
-                if not faces:
-                    continue
-                main = _main_direction(nx, ny, nz)
-                i, j = int((x - low[0]) / cell) - i0, int((y - low[1]) / cell) - j0
-                row = index[main, layer, i, j]
-                if row < 0:
-                    if n == size:
-                        sums, last = _longer(sums, last)
-                        size *= 2
-                    row = index[main, layer, i, j] = n
-                    n += 1
-                _add(sums[row], x, y, h, nx, ny, nz)
-                if last[row] != k:
-                    sums[row, 7] += 1
-                    last[row] = k
+    line, found, at = np.empty((3, width)), np.empty((6, width)), np.empty(width, np.int64)
+    for k in range(len(images.depth)):
+        left, right, upper, lower = _window_of(box, images, k)
+        first = _first(left, step, stride)
+        wide = max(0, (min(width - step, right + 1) - first + stride - 1) // stride)
+        for v in range(_first(upper, step, stride), min(images.depth.shape[1] - step, lower + 1), stride):
+            on = _line_found(images, k, v, first, stride, step, noise, cubes, line[:, :wide], found, at)
+            if n + on > len(sums):
+                sums, last = _longer(sums, last)
+            n = _added(found, at, on, k, index, sums, last, n)
     return _means(sums[:n])
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
-def _add(patch: Any, x: float, y: float, h: float, nx: float, ny: float, nz: float) -> None:
-    """Add a pixel to the sums (8,) of its patch, but for the count of views."""
-    patch[0] += x
-    patch[1] += y
-    patch[2] += h
-    patch[3] += nx
-    patch[4] += ny
-    patch[5] += nz
-    patch[6] += 1.0
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _line_found(
+    images: Images, k: int, v: int, first: int, stride: int, step: int, noise: float,
+    cubes: _Cubes, line: Any, found: Any, at: Any,
+) -> int:  # fmt: skip
+    """Write points and normals of the pixels of row v of view k into found (6, M), the numbers of their cubes into at
+    (M,); return how many."""
+    depth, unit, (fx, fy, cx, cy), R, p = images
+    rows, columns = cubes.number.shape
+    for m in range(line.shape[1]):
+        line[0, m] = depth[k, v, first + m * stride]
+    line_of_points(images, k, first, v, stride, cubes.low, cubes.edge, line)
+    b, on = (v - cy) / fy, 0
+    for m in range(line.shape[1]):
+        i, j, h = line[0, m], line[1, m], line[2, m]
+        if not (0 <= i < rows and 0 <= j < columns):
+            continue
+        place = cubes.number[np.uint32(i), np.uint32(j)]
+        layer = int(np.floor((h - cubes.floor) / cubes.edge))
+        if place < 0 or layer < 0 or layer >= cubes.layers:
+            continue
+        u = first + m * stride
+        a, z = (u - cx) / fx, depth[k, v, u] * unit
+        faces, x, y, up = normal_of(images, k, u, v, a, b, z, step, noise)
+        if not faces:
+            continue
+        at[on] = (_main_direction(x, y, up) * cubes.layers + layer) * cubes.columns + place
+        found[0, on] = z * (R[k, 0, 0] * a + R[k, 0, 1] * b + R[k, 0, 2]) + p[k, 0]
+        found[1, on] = z * (R[k, 1, 0] * a + R[k, 1, 1] * b + R[k, 1, 2]) + p[k, 1]
+        found[2, on], found[3, on], found[4, on], found[5, on] = h, x, y, up
+        on += 1
+    return on
+
+
+@numba.njit(cache=True, nogil=True)
+def _added(found: Any, at: Any, on: int, k: int, index: Any, sums: Any, last: Any, n: int) -> int:
+    """Add the first `on` pixels found in view k to the sums (S, 8) of their cubes, of which n are in use; return n.
+
+    Apart from what finds them, so that a processor fetches many of these scattered rows at once.
+
+    index  row of the sums of each cube, -1 where it has none yet
+    last   (S,) view that was added last
+    """
+    for m in range(on):
+        row = index[at[m]]
+        if row < 0:
+            row = index[at[m]] = n
+            n += 1
+        for c in range(6):
+            sums[row, c] += found[c, m]
+        sums[row, 6] += 1
+        if last[row] != k:
+            sums[row, 7] += 1
+            last[row] = k
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def _numbered(mask: Any) -> tuple[Any, int]:
+    """Return the cells (I, J) of a mask numbered row by row, others -1, and how many there are."""
+    number, n = np.full(mask.shape, -1, np.int32), 0
+    for i in range(mask.shape[0]):
+        for j in range(mask.shape[1]):
+            if mask[i, j]:
+                number[i, j] = n
+                n += 1
+    return number, n
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)

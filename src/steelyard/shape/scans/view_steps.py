@@ -146,7 +146,7 @@ def _of_views(images: Images, xyz: Any, normal: Any, middle: Any, window: float,
     return H, g
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def weight_of(over: float, sigma: float) -> float:
     """Return Huber's weight [1/m^2] of a distance `over` with standard deviation sigma [m]."""
     return 1 / sigma**2 * min(1.0, 2 * sigma / (abs(over) + 1e-12))
@@ -180,7 +180,7 @@ def _together(images: Images, xyz: Any, normal: Any, middle: Any, window: float,
     return g, own, mean_row
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def measured(images: Images, k: int, x: Any, n: Any, row: Any, middle: Any, noise: float) -> Any:
     """Return whether view k faces a point x (3,) with normal n (3,), how high over it it measures and how surely [m].
 
@@ -210,7 +210,7 @@ def measured(images: Images, k: int, x: Any, n: Any, row: Any, middle: Any, nois
     return True, over, noise * z * z * cosine + _FLOOR
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _faces_alike(images: Images, k: int, u: int, v: int, a: float, b: float, m: float, n: Any, noise: float) -> bool:
     """Whether the surface at pixel (u, v), of depth m [m], faces about as n (3,) does.
 
