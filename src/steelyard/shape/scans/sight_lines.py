@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from steelyard.shape.points.medians import middle_mean, quantile
-from steelyard.shape.scans.depth_images import FACING, Images, pixel_of
+from steelyard.shape.scans.depth_images import FACING, Images, lent, pixel_of
 
 UPWARD = 0.7  # least upward component of the normal of a surface that faces up
 _NOTHING, _SURFACE, _PAST = 0.0, 1.0, 2.0  # what a view says of a point
@@ -59,7 +59,7 @@ def _projected(images: Images, cameras: Any, x: Any, place: Any, at: Any) -> Non
         at[k] = np.int64((float(k) * height + v) * width + u if falls else 0.0)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _fetched(images: Images, cameras: Any, x: Any, work: Any, at: Any) -> None:
     """Write what every view measures where it has a point x (3,): work (8, V) as in `_looked`, from row 3 on."""
     pixels, measured = images.depth.reshape(-1), work[6]
@@ -78,7 +78,7 @@ def _incidence(cameras: Any, x: Any, n: Any, cosine: Any) -> None:
         cosine[k] = -(dx * n0 + dy * n1 + dh * n2) / math.sqrt(dx * dx + dy * dy + dh * dh)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _looked(images: Images, cameras: Any, x: Any, n: Any, window: float, noise: float, work: Any, at: Any) -> None:
     """Write what every view measures near one point x (3,) with normal n (3,).
 
@@ -120,14 +120,16 @@ def _said(unit: float, lens: Any, cameras: Any, x: Any, n: Any, window: float, n
 def settled(images: Images, xyz: Any, normal: Any, window: float, noise: float, rounds: int) -> Any:
     """Move points (N, 3) along their normals to the middle of what the views measure; return support (N, 3).
 
-    support  views that measure the surface, views that saw past it, and the rms of what is left [m]
+    support  views that measure the surface, views that saw past it, and the rms of what is left [m]; by the pixels that
+             the points fell on before their last move
     """
+    images = lent(images)
     cameras = _laid_out(images)
     work, at = _room(len(images.p))
     says, over, heights = work[0], work[1], work[7]
     support = np.zeros((len(xyz), 3))
     for i in range(len(xyz)):
-        for turn in range(rounds + 1):
+        for turn in range(max(rounds, 1)):
             _looked(images, cameras, xyz[i], normal[i], window, noise, work, at)
             on, past, square = 0, 0, 0.0
             for k in range(len(at)):
@@ -137,19 +139,19 @@ def settled(images: Images, xyz: Any, normal: Any, window: float, noise: float, 
             support[i, 0], support[i, 1] = on, past
             if on == 0:
                 break
+            step = middle_mean(heights, on) if turn < rounds else 0.0
             for r in range(on):
-                square += heights[r] ** 2
+                square += (heights[r] - step) ** 2
             support[i, 2] = np.sqrt(square / on)
-            if turn < rounds:
-                step = middle_mean(heights, on)
-                for j in range(3):
-                    xyz[i, j] += step * normal[i, j]
+            for j in range(3):
+                xyz[i, j] += step * normal[i, j]
     return support
 
 
 @numba.njit(cache=True, nogil=True)
 def said(images: Images, xyz: Any, normal: Any, window: float, noise: float) -> Any:
     """Return of how many points (N, 3) each view measures the surface, and past how many it sees: (V, 2)."""
+    images = lent(images)
     cameras = _laid_out(images)
     work, at = _room(len(images.p))
     out = np.zeros((len(at), 2))
@@ -171,6 +173,7 @@ def colours(
            which nothing but the table's own noise comes as near to
     """
     depth, unit, camera, R, p = images
+    images = lent(images)
     cameras = _laid_out(images)
     work, at = _room(len(depth))
     values, pixels, heights = np.empty((3, len(depth))), rgb.reshape(-1, 3), depth.reshape(-1)
@@ -208,6 +211,7 @@ def seen_past(images: Images, points: Any, margin: float, noise: float, enough: 
 
     Views that saw past the point before are asked first: that changes how soon there are enough and nothing else.
     """
+    images = lent(images)
     cameras = _laid_out(images)
     work, at = _room(len(images.p))
     last, known = np.empty(enough, np.int64), 0
@@ -239,6 +243,7 @@ def sights(images: Images, points: Any, noise: float) -> Any:
 
     Within 3 standard deviations of the depth noise, and three pixel widths before it for a surface seen flat.
     """
+    images = lent(images)
     cameras = _laid_out(images)
     work, at = _room(len(images.p))
     out = np.zeros((len(points), 2))
@@ -295,6 +300,7 @@ def feet(images: Images, xyz: Any, normal: Any, step: float, levels: int, noise:
     Down the wall, sight lines that still end on it are told from those that pass under it and end on the table, by
     least squares over all views that face it.
     """
+    images = lent(images)
     cameras, p = _laid_out(images), images.p
     work, at = _room(len(p))
     out = np.zeros(len(xyz))
