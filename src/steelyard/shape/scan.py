@@ -115,6 +115,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
         *findings_of(scene, found, level, placed, mistake),
         *few_seen(seen / len(xyz), len(scene.views), scene.enough),
     )
+    clock.lap("findings")
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,

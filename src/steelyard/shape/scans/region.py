@@ -15,6 +15,7 @@ from steelyard.shape.scans.grid import Grid
 from steelyard.shape.scans.scene import Scene
 
 STRIDE = 3  # of the pixels that are averaged
+_PIXELS = 1_000_000  # that show how high what stands on the table is, about
 _ENDS, _CUT = 1.0, 0.5  # per cent of an object: its ends; share of the images from which on enough hold them
 _FULL, _SPARED = 18, 0.85  # images of which none is to be spared, of few that share
 _LOOKED_AT = 1000  # spots that are asked for that
@@ -145,7 +146,8 @@ def heights(scene: Scene) -> tuple[Grid, Array]:
     """
     pitch = 2 * scene.pixel
     grid, far = Grid.about_origin(int(REACHES[0] * scene.distance / pitch), pitch), scene.distance
-    sums = images.height_map(scene.images, STRIDE, grid.low, pitch, -far, far, *grid.shape)
+    stride = max(STRIDE, images.stride_of(scene.views.depth, _PIXELS))
+    sums = images.height_map(scene.images, stride, grid.low, pitch, -far, far, *grid.shape)
     enough = sums[..., 0] >= _WATCHED * np.median(sums[..., 0][sums[..., 0] > 0])
     return grid, np.where(enough, sums[..., 1] / np.maximum(sums[..., 0], 1), 0.0)
 

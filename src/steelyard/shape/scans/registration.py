@@ -83,13 +83,9 @@ def _of_few(views: Array) -> Array:
 
 def _expected(scene: Scene, xyz: Array, normal: Array) -> Array:
     """Return the spread (N,) [m] that noise makes about points (N, 3): cameras are nearer to those high up."""
-    square, seen = np.zeros(len(xyz)), np.zeros(len(xyz))
-    for eye in scene.p:
-        way = eye - xyz
-        far = (way**2).sum(1)
-        faces = (way * normal).sum(1) > FACING * np.sqrt(far)
-        square += np.where(faces, far, 0.0)
-        seen += faces
+    far = (scene.p**2).sum(1)[:, None] - 2 * scene.p @ xyz.T + (xyz**2).sum(1)
+    faces = scene.p @ normal.T - (xyz * normal).sum(1) > FACING * np.sqrt(far)
+    square, seen = np.where(faces, far, 0.0).sum(0), faces.sum(0)
     usual = scene.distance**2
     return INCIDENCE * scene.noise * np.where(seen > 0, square / np.maximum(seen, 1), usual)
 
@@ -243,6 +239,8 @@ def _clear_of_feet(xyz: Array, normal: Array, low: float, near: float) -> Any:
     From one side views have the table there, from the other what stands on it: they would never agree, and push each
     other away from it.
     """
-    on_table = xyz[:, 2] < low
-    away, _ = cKDTree(xyz[~on_table, :2]).query(xyz[:, :2], distance_upper_bound=near)
-    return ~on_table | ((away >= near) & (normal[:, 2] >= _LEVEL))
+    clear = xyz[:, 2] >= low
+    on_table = np.flatnonzero(~clear)
+    away, _ = cKDTree(xyz[clear, :2]).query(xyz[on_table, :2], distance_upper_bound=near)
+    clear[on_table] = (away >= near) & (normal[on_table, 2] >= _LEVEL)
+    return clear

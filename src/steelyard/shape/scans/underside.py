@@ -161,12 +161,13 @@ def rim_of(under: Any) -> Any:
 
 
 def median_along(height: Array, rim: Any) -> Array:
-    """Return for each cell the median height of the cells of the rim within two cells of it, 0 without any."""
-    padded = np.pad(np.where(rim, height, np.nan), 2, constant_values=np.nan)
-    i, j = height.shape
-    near = np.sort(np.stack([padded[a : a + i, b : b + j] for a in range(5) for b in range(5)]), axis=0)
-    middle = np.maximum(np.isfinite(near).sum(0) - 1, 0) // 2
-    return np.asarray(np.nan_to_num(np.take_along_axis(near, middle[None], axis=0)[0]))
+    """Return heights (I, J), those of the rim the median of the cells of the rim within two cells of them."""
+    out, padded = height.copy(), np.pad(np.where(rim, height, np.nan), 2, constant_values=np.nan)
+    i, j = np.nonzero(rim)
+    beside, above = np.divmod(np.arange(25), 5)
+    near = np.sort(padded[i[:, None] + beside, j[:, None] + above], axis=1)  # cells of no rim come last
+    out[i, j] = near[np.arange(len(i)), (np.isfinite(near).sum(1) - 1) // 2]
+    return out
 
 
 def _smooth(height: Array, under: Any) -> Array:

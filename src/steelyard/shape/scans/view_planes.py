@@ -148,10 +148,11 @@ def _weight(judges: Array, plane: Array, clear: float) -> float:
 @numba.njit(cache=True, nogil=True)
 def _through(xyz: Any, rows: Any) -> Any:
     """Return the height a + b x + c y (3,) of the plane through three points; one that is far off where none is."""
-    A, b = np.ones((3, 3)), np.empty(3)
-    for r in range(3):
-        A[r, 1], A[r, 2], b[r] = xyz[rows[r], 0], xyz[rows[r], 1], xyz[rows[r], 2]
-    one, other = A[1] - A[0], A[2] - A[0]
-    if abs(one[1] * other[2] - one[2] * other[1]) < 1e-12:
+    first, one, other = xyz[rows[0]], xyz[rows[1]], xyz[rows[2]]
+    x1, y1, z1 = one[0] - first[0], one[1] - first[1], one[2] - first[2]
+    x2, y2, z2 = other[0] - first[0], other[1] - first[1], other[2] - first[2]
+    area = x1 * y2 - x2 * y1
+    if abs(area) < 1e-12:
         return np.full(3, np.inf)
-    return np.linalg.solve(A, b)
+    along, across = (z1 * y2 - z2 * y1) / area, (x1 * z2 - x2 * z1) / area
+    return np.array([first[2] - along * first[0] - across * first[1], along, across])
