@@ -67,6 +67,21 @@ def test_another_order_or_sign_is_put_right(
             np.testing.assert_array_equal(stream.channels[part], meant.channels[part])
 
 
+@pytest.mark.parametrize(
+    ("force", "read"), [(CYCLE, "Fx = Fz, Fy = Fx, Fz = Fy"), (X @ Y, "Fx = -Fx, Fy = -Fy, Fz = Fz")]
+)
+def test_forces_that_are_turned_without_their_torques(force: np.ndarray, read: str) -> None:
+    sound = hammer_log()
+    put, found = examine(mixed(sound, force, NONE))
+    assert [f.code for f in found] == ["force-unit"]
+    assert f"forces fit one body if they are read as {read}" in found[0].message
+    for stream, meant in zip(put.streams, sound.streams, strict=True):
+        if "force" in meant.channels:
+            np.testing.assert_array_equal(stream.channels["force"], meant.channels["force"])
+    # With its torques it is the sensor that is turned.
+    assert [f.code for f in examine(mixed(sound, force, force))[1]] == ["sensor-turned"]
+
+
 def test_torques_of_the_other_sign_are_put_right() -> None:
     found, sound = identify(mixed(hammer_log(), NONE, -NONE)), hammer_answer()
     assert found.codes() == sound.codes() | {"force-unit"}

@@ -12,6 +12,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.left_over import left_over, of_another_fit
+from steelyard.sanity.fitted.tether import Tether
 from steelyard.simulate import hammer
 from steelyard.simulate.motions import Step, StopAndGo
 
@@ -88,6 +89,26 @@ def test_a_slack_one_changes_nothing() -> None:
     recording = hammer.recording(0).recording
     slack = sy.identify(pulled(recording, "above", 6.0, slack=3.0))
     assert np.array_equal(slack.covariance, sy.identify(recording).covariance)
+
+
+@pytest.mark.parametrize(("anchor", "stiffness"), [("above", 1.5), ("beside", 1.5), ("beside", 6.0)])
+def test_one_on_a_tool_that_turns_in_place(anchor: str, stiffness: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Alike in all directions its stiffness looks like a bias; the pull shows by the point where it hangs."""
+    monkeypatch.setattr(hammer, "motion", lambda: replace(TURNS, moves=()))
+    found = answer(anchor, stiffness)
+    assert np.abs(misses(found)).max() < 3
+    (said,) = (f for f in found.findings if f.code == "contact")
+    assert "Something hangs on what is held and pulls" in said.message
+    assert not {"bias-drift", "base-tilted", "motion-mismatch"} & found.codes()
+
+
+@pytest.mark.parametrize(
+    ("across", "words"), [((3.0, 3.001), "and 3 N/m across"), ((2.0, 3.0), "and 2 to 3 N/m across")]
+)
+def test_stiffness_that_reads_alike_is_said_once(across: tuple[float, float], words: str) -> None:
+    nothing = np.zeros(3)
+    hose = Tether(nothing, 0.1, np.diag([*across, 12.0]), nothing, nothing, np.array([0.0, 0.0, 1.0]), np.eye(10))
+    assert words in hose.finding.message
 
 
 def test_one_that_bears_more_than_the_load_weighs_is_refused() -> None:

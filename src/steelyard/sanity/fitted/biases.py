@@ -149,6 +149,7 @@ class RoomFit:
     times       of how many such standard deviations the surest direction is
     slowly      what it leaves of means over a second, beside what no such bias leaves
     tilted      the same beside what another direction of gravity leaves
+    left        squared residual beside that without
     best        whether it leaves less than a turned sensor, unlike gains or another point
     """
 
@@ -157,6 +158,7 @@ class RoomFit:
     times: float
     slowly: float
     tilted: float
+    left: float
     best: bool
 
     @property
@@ -219,4 +221,4 @@ def room_fit(log: MotionLog, rotation: Array, gravity: Array, drift: bool) -> Ro
     left = fit.beside(once)
     others = sensor_matrix(log, drift), misplaced(log, drift)
     best = all(other is None or left < other.left for other in others)
-    return RoomFit(force, std, times, slowly / slow, slowly / max(tilted, 1e-300), best)
+    return RoomFit(force, std, times, slowly / slow, slowly / max(tilted, 1e-300), left, best)

@@ -19,6 +19,7 @@ from steelyard.inertia import forms
 from steelyard.logs.alignment import Aligned
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.after import position_of, rotation_of
+from steelyard.sanity.fitted.biases import room_fit
 from steelyard.sanity.fitted.full_fit import CALM, NOISE, FullFit, Rows, moves, noise_share
 from steelyard.sanity.fitted.gravity import fitted_gravity
 from steelyard.sanity.fitted.misplaced import misplaced
@@ -39,12 +40,12 @@ PUSHED = 0.2
 BETTER = 0.8
 # [m] Nothing hangs farther from the sensor. How far it may be drawn out, where nothing else tells its pull.
 FARTHEST, DRAWN = 1.0, 1.0
+# So many times as hard as across gravity one may pull along it whose stiffness does not show: most hang from above.
+ABOVE = 2.0
 # Combinations that a body and a bias mimic to this share of their squares are not told.
 TOLD = 1e-5
 # The point is sought anew by at most so much at once [m], until it moves by less.
 ROUNDS, STEP, SETTLED = 10, 0.05, 1e-3
-# A steady force, a symmetric stiffness, a point.
-NUMBERS = 12
 # Symmetric matrices (6, 3, 3).
 _STIFFNESSES = forms.inertia_matrix(np.eye(10)[4:])
 _REMEDY = (
@@ -98,17 +99,26 @@ class Tether:
     @property
     def finding(self) -> Finding:
         """What is said of it."""
-        values, axes = np.linalg.eigh(self.stiffness)
-        values = np.maximum(values, 0.0)
-        pull = -self.steady + 0.0
+        at, pull = f"at ({shortly(1e3 * self.point)}) mm in S", shortly(0.0 - self.steady)
         text = (
-            "Something hangs on what is held and pulls harder the farther it is drawn out, as a hose, a cable or a "
-            f"spring does: by {values[2]:.2g} N/m along ({axis_words(axes[:, 2])}) of W and {values[0]:.2g} to "
-            f"{values[1]:.2g} N/m across that, at ({shortly(1e3 * self.point)}) mm in S, and in the middle of "
-            f"the motion with ({shortly(pull)}) N along x, y, z of W. The answer is without it. Acceleration "
-            f"alone tells its force along gravity from weight: {self.doubt:.2g} N of doubt are in the bar of the mass."
+            f"Something hangs on what is held and {self._pulls} {at}, and in the middle of the motion with ({pull}) N "
+            "along x, y, z of W. The answer is without it. Acceleration alone tells its force along gravity from "
+            f"weight: {self.doubt:.2g} N of doubt are in the bar of the mass."
         )
         return Finding("contact", text, _REMEDY)
+
+    @property
+    def _pulls(self) -> str:
+        """Say how it pulls."""
+        if not self.stiffness.any():
+            return "pulls in one direction of the room, as a hose, a cable or a spring does:"
+        values, axes = np.linalg.eigh(self.stiffness)
+        soft, middle, stiff = (f"{value:.2g}" for value in np.maximum(values, 0.0))
+        across = soft if soft == middle else f"{soft} to {middle}"
+        return (
+            "pulls harder the farther it is drawn out, as a hose, a cable or a spring does: by "
+            f"{stiff} N/m along ({axis_words(axes[:, 2])}) of W and {across} N/m across that,"
+        )
 
 
 def examine_tether(log: MotionLog, aligned: Aligned, gravity: Array, turned: bool, drift: bool) -> Tether | None:
@@ -137,7 +147,8 @@ def examine_tether(log: MotionLog, aligned: Aligned, gravity: Array, turned: boo
         return None
     # Beforehand it pulls along gravity as hard as to either side, and as where it is drawn out by so much.
     across = level @ level.T @ found.steady
-    usual = float(np.hypot(np.linalg.norm(across) / np.sqrt(2), DRAWN * up @ found.stiffness @ up))
+    aside, drawn = float(np.linalg.norm(across)), float(DRAWN * up @ found.stiffness @ up)
+    usual = np.hypot(aside / np.sqrt(2), drawn) if found.stiffness.any() else ABOVE * aside
     std, moved = found.upward(size * (OF_ACCELERATION + NOISE * noise) * found.fit.phi[0])
     share = 1 / (1 + (usual / std) ** 2)  # of what is known beforehand
     steady = across + (1 - share) * (up @ found.steady) * up
@@ -148,15 +159,16 @@ def examine_tether(log: MotionLog, aligned: Aligned, gravity: Array, turned: boo
 class _Sought:
     """What fits best: steady force (3,), stiffness (3, 3) and point (3,) as of a `Tether`.
 
-    fit   the fit of those combinations of its numbers that are told, in the columns of `told` (n, k)
-    left  squared residual beside that without a tether
+    fit    the fit of those combinations of its numbers that are told
+    along  (k,) what they make of the force along gravity; None where no acceleration tells that
+    left   squared residual beside that without a tether
     """
 
     steady: Array
     stiffness: Array
     point: Array
     fit: FullFit
-    told: Array
+    along: Array | None
     left: float
 
     def upward(self, doubted: float) -> tuple[float, Array]:
@@ -165,11 +177,10 @@ class _Sought:
 
         doubted  [N] by how much accelerations may be wrong about it
         """
-        own, covariance = self.fit.own, self.fit.covariance[:10, :10]
-        along, std = self.told[2], np.inf
-        if self.told.shape == (NUMBERS, NUMBERS):
-            variance = max(float(along @ self.fit.extra_covariance @ along), 1e-300)
-            follow = self.fit.covariance[:10, own:] @ along
+        own, covariance, std = self.fit.own, self.fit.covariance[:10, :10], np.inf
+        if self.along is not None:
+            variance = max(float(self.along @ self.fit.extra_covariance @ self.along), 1e-300)
+            follow = self.fit.covariance[:10, own:] @ self.along
             covariance, std = (
                 covariance - np.outer(follow, follow) / variance,
                 float(np.hypot(np.sqrt(variance), doubted)),
@@ -179,8 +190,12 @@ class _Sought:
 
 
 def _best(found: _Sought, log: MotionLog, rotation: Array, gravity: Array, source: str, drift: bool) -> bool:
-    """Tell whether a tether leaves less than a turned sensor, unlike gains, another point, or tilted gravity."""
-    others = sensor_matrix(log, drift), misplaced(log, drift)
+    """Tell whether a tether leaves less than a turned sensor, unlike gains, another point, or tilted gravity.
+
+    One that pulls steadily must leave less than a bias in the room as well, which is no more numbers.
+    """
+    room = None if found.stiffness.any() else room_fit(log, rotation, gravity, drift)
+    others = sensor_matrix(log, drift), misplaced(log, drift), room
     tilted = fitted_gravity(log, rotation, gravity, source)
     best = all(other is None or found.left < other.left for other in others)
     return best and (tilted is None or found.left < BETTER * tilted.left)
@@ -189,14 +204,27 @@ def _best(found: _Sought, log: MotionLog, rotation: Array, gravity: Array, sourc
 def _sought(rows: Rows, R: Array, p: Array, ways: Array) -> _Sought | None:
     """Return the tether that fits best; None where none is sure.
 
+    Where the sensor turns in place, its point shows by a steady pull first; how stiff it is may not show there.
+
     R, p  (N, 3, 3) S to W and (N, 3) [m] from the middle at the rows
     ways  (3, k) axes in W along which a steady force is told
     """
+    stiff = _settled(rows, R, p, ways, _STIFFNESSES, np.zeros(3))
+    if stiff is not None:
+        return stiff
+    steady = _settled(rows, R, p, ways, _STIFFNESSES[:0], np.zeros(3))
+    return None if steady is None else _settled(rows, R, p, ways, _STIFFNESSES, steady.point) or steady
+
+
+def _settled(rows: Rows, R: Array, p: Array, ways: Array, kinds: Array, point: Array) -> _Sought | None:
+    """Return the tether that fits best from a first point (3,) [m] on; None where it is not sure.
+
+    kinds  (j, 3, 3) symmetric matrices that its stiffness is made of; without any it pulls steadily across gravity
+    """
     once, count = rows.solve(), ways.shape[1]
-    numbers, slow = np.zeros(count + 9), rows.slowly(once)
-    trace = np.concatenate([np.zeros(count), np.einsum("kii->k", _STIFFNESSES), np.zeros(3)])
+    numbers, slow = np.concatenate([np.zeros(count + len(kinds)), point]), rows.slowly(once)
     for turn in range(ROUNDS):
-        columns, offset = _linear(numbers, R, p, ways)
+        columns, offset = _linear(numbers, R, p, ways, kinds)
         if not turn:
             columns = columns[:, :, :-3]  # with no force yet no point is told
         told = rows.told(columns, TOLD)
@@ -205,32 +233,45 @@ def _sought(rows: Rows, R: Array, p: Array, ways: Array) -> _Sought | None:
         columns, shifted = columns @ told, replace(rows, values=rows.values - offset)
         fit, told = shifted.solve(columns, jackknife=True), np.pad(told, ((0, len(numbers) - len(told)), (0, 0)))
         before, numbers = numbers, told @ fit.extra
-        spread = float(np.sqrt(trace @ told @ fit.extra_covariance @ told.T @ trace))
-        if abs(trace @ numbers) < (SURE if turn else LIKELY) * spread:
+        counts = _counts(numbers, kinds)
+        spread = float(np.sqrt(counts @ told @ fit.extra_covariance @ told.T @ counts))
+        if abs(counts @ numbers) < (SURE if turn else LIKELY) * spread:
             return None
         step = numbers[-3:] - before[-3:]
         numbers[-3:] = before[-3:] + np.clip(step, -STEP, STEP)
         if turn and np.linalg.norm(step) < SETTLED:
             break
-    steady, stiffness, point = _apart(numbers, ways)
+    steady, stiffness, point = _apart(numbers, ways, kinds)
     values = np.linalg.eigvalsh(stiffness * np.sign(np.trace(stiffness)))
     pushes, far = values[0] < -PUSHED * values[2], np.linalg.norm(point) > FARTHEST
     if pushes or far or shifted.slowly(fit, columns) > SLOWLY * slow:
         return None
-    return _Sought(steady, stiffness, point, fit, told, fit.beside(once))
+    along = told[2] if count == 3 and told.shape == (len(numbers), len(numbers)) else None
+    return _Sought(steady, stiffness, point, fit, along, fit.beside(once))
 
 
-def _apart(numbers: Array, ways: Array) -> tuple[Array, Array, Array]:
-    """Return steady force (3,), stiffness (3, 3) and point (3,) of the numbers (k + 9,) of a tether."""
-    return ways @ numbers[:-9], np.einsum("k,kij->ij", numbers[-9:-3], _STIFFNESSES), numbers[-3:]
+def _counts(numbers: Array, kinds: Array) -> Array:
+    """Return by which combination of its numbers (n,) a tether counts: its stiffness over the axes, or its pull."""
+    counts = np.zeros(len(numbers))
+    if len(kinds):
+        counts[-9:-3] = np.einsum("kii->k", kinds)
+    else:
+        counts[:2] = numbers[:2] / max(float(np.linalg.norm(numbers[:2])), 1e-300)
+    return counts
 
 
-def _linear(numbers: Array, R: Array, p: Array, ways: Array) -> tuple[Array, Array]:
-    """Return columns (N, 6, k + 9) and offset (N, 6) of the wrench of a tether about its numbers (k + 9,)."""
-    steady, stiffness, point = _apart(numbers, ways)
+def _apart(numbers: Array, ways: Array, kinds: Array) -> tuple[Array, Array, Array]:
+    """Return steady force (3,), stiffness (3, 3) and point (3,) of the numbers (k + j + 3,) of a tether."""
+    count = ways.shape[1]
+    return ways @ numbers[:count], np.einsum("k,kij->ij", numbers[count:-3], kinds), numbers[-3:]
+
+
+def _linear(numbers: Array, R: Array, p: Array, ways: Array, kinds: Array) -> tuple[Array, Array]:
+    """Return columns (N, 6, k + j + 3) and offset (N, 6) of the wrench of a tether about its numbers (k + j + 3,)."""
+    steady, stiffness, point = _apart(numbers, ways, kinds)
     at, back, lever = p + R @ point, np.swapaxes(R, 1, 2), cross_matrix(point)
     force = np.einsum("nij,nj->ni", back, steady + at @ stiffness)
-    drawn = np.einsum("nij,kjl,nl->nik", back, _STIFFNESSES, at, optimize=True)
+    drawn = np.einsum("nij,kjl,nl->nik", back, kinds, at, optimize=True)
     of_force = np.concatenate([back @ ways, drawn, back @ stiffness @ R], 2)
     of_torque = lever @ of_force
     of_torque[:, :, -3:] -= cross_matrix(force)

@@ -57,7 +57,9 @@ def examine_order(recording: Recording, view: Glance, reading: Reading) -> tuple
         return recording, ()
     tilt = tilt_at_a_glance(view, reading.gravity, view.rotation, reading.fit.mass)
     turned = turn_at_a_glance(view, reading.gravity, sign_of(view, reading))
-    if any(rival is not None and mixed.left > 0.5 * rival.force_share for rival in (turned, tilt)):
+    # A turn of the columns explains as much as one of S, which the torques rule out.
+    rivals = (tilt, turned if np.linalg.det(mixed.axes) < 0 else None)
+    if any(rival is not None and mixed.left > 0.5 * rival.force_share for rival in rivals):
         return recording, ()
     return mixed.put_right(recording) if mixed.sure else recording, (mixed.finding(reading.fit.force_share),)
 

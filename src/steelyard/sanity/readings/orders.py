@@ -1,8 +1,9 @@
 """Orders: columns of the force, or of the torque, in another order or with other signs than was said.
 
 A turn of S turns both, and makes no left hand of a right one. Mistakes in a description, and drivers, do so: one axis
-reversed, two exchanged. The orders are tried in the axes in which the columns were given. Of a torque at rest either
-sign fits as well: then motion tells, or else the order with the fewest changes is taken.
+reversed, two exchanged. A cycle of the force's columns, or two reversed, is a turn: there the torques tell, which have
+not taken part. The orders are tried in the axes in which the columns were given. Of a torque at rest either sign fits
+as well: then motion tells, or else the order with the fewest changes is taken.
 """
 
 from __future__ import annotations
@@ -25,10 +26,13 @@ _PLACE: dict[Part, slice] = {"torque": slice(0, 3), "force": slice(3, 6)}
 
 # The 24 (24, 3, 3) that turn a right hand into a left one; each is one of the 24 turns with the sign of all reversed.
 REFLECTIONS = np.stack([X for X in signed_axes() if np.linalg.det(X) < 0])
+TURNS = -REFLECTIONS
 
 # An order is beyond doubt where it leaves less than the first share of the variance, and less than the second of what
 # any other order would leave.
 WELL, BESIDE = 0.05, 0.5
+# Torques that have not taken part in a turn leave less than this share of what they would leave, turned back with it.
+ALONE = 0.1
 # First moments of mass nearer than this share of one are the same.
 SAME = 0.05
 # A mass has the right sign beyond so many standard deviations.
@@ -103,17 +107,20 @@ class Order:
         return f"Turn the sign of {' and '.join(turned)} round where the {self.part} columns are logged{ordered}."
 
 
-def orders(recording: Recording, view: Glance, part: Part, gravity: Array, rotation: Array | None) -> list[Order]:
-    """Return the reflections of columns of a part, that which leaves least first; turns are those with the other sign.
+def orders(
+    recording: Recording, view: Glance, part: Part, gravity: Array, rotation: Array | None, ways: Array = REFLECTIONS
+) -> list[Order]:
+    """Return ways to read columns of a part, that which leaves least first; the other sign of all leaves as much.
 
     gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3)
+    ways               (K, 3, 3) signed axes to try
     """
     stream = recording.stream_of(part)
     turn = np.eye(3) if stream is None or stream.turn is None or part in view.world else stream.turn.matrix
     seen = view.seen(gravity, rotation)
     body = columns(seen)[_PLACE[part].start // 3]
     found = []
-    for X in REFLECTIONS:
+    for X in ways:
         wrench = view.wrench[:, _PLACE[part]] @ turn @ X @ turn.T
         found.append(Order(part, X, *solve(body, view.smooth(view.in_sensor(part, wrench, rotation)), view.block)))
     return sorted(found, key=lambda order: order.left)
@@ -126,11 +133,24 @@ def order_of_forces(recording: Recording, view: Glance, gravity: Array, rotation
     """
     if rotation is None or any(view.dead[3:]):
         return None
-    ways = min(
-        (orders(recording, v, "force", gravity, rotation) for v in (view, view.still)), key=lambda found: found[0].left
-    )
-    weighed = [o for o in ways if o.solution[0] > SURE * o.std[0] and o.axes.trace() > -3]
+
+    def told(axes: Array) -> list[Order]:
+        views = (orders(recording, v, "force", gravity, rotation, axes) for v in (view, view.still))
+        ways = min(views, key=lambda found: found[0].left)
+        return [o for o in ways if o.solution[0] > SURE * o.std[0] and abs(o.axes.trace()) < 3]
+
+    mirrored, turned = told(REFLECTIONS), [o for o in told(TURNS) if o.left < WELL]
+    turned = [o for o in turned if _alone(recording, view, o.axes, gravity, rotation)]
+    weighed = sorted(mirrored + turned, key=lambda order: order.left)
     return likeliest(weighed) if weighed else None
+
+
+def _alone(recording: Recording, view: Glance, axes: Array, gravity: Array, rotation: Array) -> bool:
+    """Tell whether the torques, as given, have not taken part in a turn of the force's columns."""
+    if any(view.dead):
+        return False
+    ways = orders(recording, view, "torque", gravity, rotation, np.stack([np.eye(3), axes]))
+    return ways[0].axes.trace() == 3 and ways[0].left < ALONE * ways[1].left
 
 
 def likeliest(found: list[Order]) -> Order:
