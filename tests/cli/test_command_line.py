@@ -11,6 +11,7 @@ import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.io import read_recording, read_result, write_result
 from steelyard.io.recordings.recording_files import write_recording
 from steelyard.logs.recording import Recording, Stream
+from steelyard.shape import scan
 from steelyard.simulate import hammer
 from steelyard.spatial import Rotation
 from steelyard.tables.numbers import plus_minus
@@ -566,6 +568,17 @@ def test_doctor() -> None:
     assert (f"{sys.executable} -m pip install 'steelyard[" in table.out) == ("not installed" in table.out)
 
 
+SCANNED, FUSED = cache(hammer.scanned), cache(scan.fuse)
+
+
+@pytest.fixture
+def scanned_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The demo's hammer is seen and fused once for all tests: views are the same object, which `fuse` knows again."""
+    monkeypatch.setattr(hammer, "scanned", SCANNED)
+    monkeypatch.setattr(scan, "fuse", FUSED)
+
+
+@pytest.mark.usefixtures("scanned_once")
 def test_demo(tmp_path: Path) -> None:
     page, kept = tmp_path / "report.html", tmp_path / "log"
     run = steelyard("demo", "--json", "-o", page, "--keep", kept)
@@ -599,6 +612,7 @@ def test_demo(tmp_path: Path) -> None:
     assert "How many parts, by shape and colour" in steelyard("segment", kept / "hammer.ply").out
 
 
+@pytest.mark.usefixtures("scanned_once")
 def test_without_pillow_the_demo_keeps_all_but_the_views(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "PIL.Image", None)
     run = steelyard("demo", "-o", tmp_path / "report.html", "--keep", tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -45,6 +46,12 @@ def pulled(recording: Recording, anchor: str, stiffness: float, slack: float = S
     return replace(recording, streams=(replace(wrench, channels=channels), poses))
 
 
+@cache
+def sound_answer(seed: int = 0) -> Estimate:
+    return sy.identify(hammer.recording(seed).recording)
+
+
+@cache
 def answer(anchor: str, stiffness: float, seed: int = 0) -> Estimate:
     """Return the answer of a recording with a hose."""
     return sy.identify(pulled(hammer.recording(seed).recording, anchor, stiffness))
@@ -69,26 +76,24 @@ def test_a_log_is_answered_without_it(anchor: str, stiffness: float) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_sound_log_keeps_its_answer(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    recording = hammer.recording(seed).recording
-    found = sy.identify(recording)
+    found = sound_answer(seed)
     assert "contact" not in found.codes()
     monkeypatch.setattr("steelyard.pipelines.rows.examine_tether", lambda *_: None)
-    assert np.array_equal(sy.identify(recording).covariance, found.covariance)
+    assert np.array_equal(sy.identify(hammer.recording(seed).recording).covariance, found.covariance)
 
 
 def test_residuals_of_all_rows_are_without_it() -> None:
     """The report kept its pull in them, and took the answer for that of another log."""
     recording = pulled(hammer.recording(0).recording, "above", 6.0)
-    found = sy.identify(recording)
+    found = answer("above", 6.0)
     _, left = left_over(recording, found)
     assert np.sqrt((left[:, 3:] ** 2).mean()) == pytest.approx(found.evidence.residual_force_N, rel=0.1)
     assert not of_another_fit(found, left)
 
 
 def test_a_slack_one_changes_nothing() -> None:
-    recording = hammer.recording(0).recording
-    slack = sy.identify(pulled(recording, "above", 6.0, slack=3.0))
-    assert np.array_equal(slack.covariance, sy.identify(recording).covariance)
+    slack = sy.identify(pulled(hammer.recording(0).recording, "above", 6.0, slack=3.0))
+    assert np.array_equal(slack.covariance, sound_answer().covariance)
 
 
 @pytest.mark.parametrize(("anchor", "stiffness"), [("above", 1.5), ("beside", 1.5), ("beside", 6.0)])

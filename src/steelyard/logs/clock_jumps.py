@@ -116,23 +116,23 @@ def _searched(
     inner = np.flatnonzero((time > time[0] + far) & (time < time[-1] - far)).astype(np.int64)
     if len(inner) < 4 * _BINS:
         return None
-    few = question.rows(inner[picked(len(inner), _FEW_ROWS)])
+    in_bins = min(len(inner), _FEW_ROWS) // _BINS * _BINS
+    few = question.rows(inner[picked(len(inner), in_bins)])
     spread, steps = Linear.of(few, start).spread, round(far / _LAG_S)
     lags = _LAG_S * np.arange(-steps, steps + 1)
-    edges = np.arange(_BINS) * len(few.time) // _BINS
     moments: list[Array] = []
     for lag in lags:
         X, wrench = seen(few, {n: replace(c, late=c.late + (lag if n in moved else 0.0)) for n, c in start.items()})
         if not moments:
             scale = np.abs(X).max(0) + 1e-12
-        z = np.concatenate([X / scale, wrench / spread], 1)
-        moments.append(np.add.reduceat(z[:, :, None] * z[:, None, :], edges, axis=0))
+        z = np.concatenate([X / scale, wrench / spread], 1).reshape(_BINS, -1, X.shape[1] + wrench.shape[1])
+        moments.append(z.swapaxes(1, 2) @ z)
     sums = np.cumsum(moments, axis=1)
     columns = sums.shape[-1] - len(spread)
     one, two = _left(sums[:, :-1], columns), _left(sums[:, -1:] - sums[:, :-1], columns)
     ends = round(_SIDE * _BINS)
     k = int((one.min(0) + two.min(0))[ends - 1 : -ends + 1].argmin()) + ends - 1
-    at = float(few.time[edges[k + 1]])
+    at = float(few.time.reshape(_BINS, -1)[k + 1, 0])
     return at, float(lags[one[:, k].argmin()]), float(lags[two[:, k].argmin()])
 
 

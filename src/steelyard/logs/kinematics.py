@@ -132,7 +132,9 @@ class Kinematics:
             gravity = np.asarray(turn.inverse().matrix @ self.gravity_world)
         elif told is not None:
             gravity = told.at(time, delays)[0][:, 0]
-        velocity, acceleration, variance = self._moving(time, delays, turn, omega)
+        channel = self.channels.get("position")
+        place = None if channel is None else channel.at(time, delays)
+        velocity, acceleration, variance = self._moving(time, delays, turn, omega, place)
         measured = acceleration is not None
         if acceleration is None:
             acceleration = np.zeros_like(omega)
@@ -141,15 +143,14 @@ class Kinematics:
         elif self.place.any():
             acceleration = acceleration - lever_acceleration(omega, alpha, self.place)
             variance = variance + float(self.place @ self.place) * alpha_variance
-        position = self._position(time, delays, turn)
+        position = self._position(place, turn)
         return Motion(gravity, turn, omega, alpha, velocity, acceleration, alpha_variance, variance, measured, position)
 
-    def _position(self, time: Array, delays: Delays, turn: Rotation | None) -> Array | None:
+    def _position(self, place: tuple[Array, Array] | None, turn: Rotation | None) -> Array | None:
         """Return where (M, 3) [m] the S origin is in W; None without positions, or where only turns tell it."""
-        channel = self.channels.get("position")
-        if channel is None or (turn is None and self.place.any()):
+        if place is None or (turn is None and self.place.any()):
             return None
-        told = channel.at(time, delays)[0][:, 0]
+        told = place[0][:, 0]
         return told if turn is None else np.asarray(told - turn.apply(self.place))
 
     def _turning(self, time: Array, delays: Delays) -> tuple[Rotation | None, Array, Array, Array]:
@@ -171,7 +172,7 @@ class Kinematics:
         return turn, omega, alpha, variance
 
     def _moving(
-        self, time: Array, delays: Delays, turn: Rotation | None, omega: Array
+        self, time: Array, delays: Delays, turn: Rotation | None, omega: Array, place: tuple[Array, Array] | None
     ) -> tuple[Array | None, Array | None, Array]:
         """Return velocity and classical acceleration (M, 3) in S, None where no channel tells it, and its variance."""
         velocity, acceleration, variance = None, None, np.zeros(len(time))
@@ -185,9 +186,8 @@ class Kinematics:
         if (channel := self.channels.get("linear_acceleration")) is not None:
             states, v = channel.at(time, delays)
             acceleration, variance = channel.in_sensor(states[:, 0], turn), v[:, 0]
-        channel = self.channels.get("position")
-        if turn is not None and channel is not None and (velocity is None or acceleration is None):
-            states, v = channel.at(time, delays)
+        if turn is not None and place is not None and (velocity is None or acceleration is None):
+            channel, (states, v) = self.channels["position"], place
             velocity = channel.in_sensor(states[:, 1], turn) if velocity is None else velocity
             if acceleration is None:
                 acceleration, variance = channel.in_sensor(states[:, 2], turn), v[:, 2]
