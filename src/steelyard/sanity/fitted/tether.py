@@ -190,12 +190,9 @@ class _Sought:
 
 
 def _best(found: _Sought, log: MotionLog, rotation: Array, gravity: Array, source: str, drift: bool) -> bool:
-    """Tell whether a tether leaves less than a turned sensor, unlike gains, another point, or tilted gravity.
-
-    One that pulls steadily must leave less than a bias in the room as well, which is no more numbers.
-    """
-    room = None if found.stiffness.any() else room_fit(log, rotation, gravity, drift)
-    others = sensor_matrix(log, drift), misplaced(log, drift), room
+    """Tell whether a tether leaves less than a turned sensor, unlike gains, another point, a bias that keeps its
+    direction in the room, or tilted gravity."""
+    others = sensor_matrix(log, drift), misplaced(log, drift), room_fit(log, rotation, gravity, drift)
     tilted = fitted_gravity(log, rotation, gravity, source)
     best = all(other is None or found.left < other.left for other in others)
     return best and (tilted is None or found.left < BETTER * tilted.left)
