@@ -147,8 +147,9 @@ def test_columns_are_told_before_a_sensor_that_only_seems_turned() -> None:
 
 
 def test_it_is_said_with_the_refusal_too(made: Recording) -> None:
-    with pytest.raises(CannotAnswer, match="Noticed before the fit: The wrench is turned by 180 degrees"):
-        held_object.identify(forces(made, np.diag([1.0, -1, -1])))
+    turn = Turn.from_euler("x", 120, degrees=True).as_matrix()
+    with pytest.raises(CannotAnswer, match="Noticed before the fit: The wrench is turned by 120 degrees"):
+        held_object.identify(forces(made, turn))
 
 
 def noisy(recording: Recording, std: float) -> Recording:
