@@ -39,15 +39,16 @@ def test_states_and_innovations_are_those_of_least_squares(order):
     rng = np.random.default_rng(order)
     clock = np.cumsum(rng.uniform(0.5, 1.5, 30))
     values = np.sin(0.6 * clock)[:, None] + 0.3 * rng.normal(size=(30, 2))
-    states, covariances, weights, quad, log_det, count = forward(clock, values, order, 0.2, True)
+    states, covariances, weights, quad, log_det, count = forward(clock, values, order, np.array([0.7]), True)
+    clock = 0.7 * clock
     filtered, cost = states.copy(), np.zeros(30)
     for k in range(WARM_UP - 1, 30):
-        mean, covariance, cost[k] = at_once(clock[: k + 1], values[: k + 1], order, 0.2)
+        mean, covariance, cost[k] = at_once(clock[: k + 1], values[: k + 1], order, 0.7)
         np.testing.assert_allclose(filtered[k], mean[-1], rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(covariances[k], covariance[-1], rtol=1e-6, atol=1e-6)
     assert count == 30 - WARM_UP
-    assert quad == pytest.approx(cost[-1] - cost[WARM_UP - 1], rel=1e-6)
-    assert log_det == pytest.approx(-np.log(1 - covariances[WARM_UP:, 0, 0]).sum(), rel=1e-9)
+    assert quad[0] == pytest.approx(cost[-1] - cost[WARM_UP - 1], rel=1e-6)
+    assert log_det[0] == pytest.approx(-np.log(1 - covariances[WARM_UP:, 0, 0]).sum(), rel=1e-9)
     backward(clock, values, states, covariances, weights)
     np.testing.assert_allclose(states, mean, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(covariances[order:], covariance[order:], rtol=1e-6, atol=1e-6)
@@ -56,9 +57,13 @@ def test_states_and_innovations_are_those_of_least_squares(order):
     np.testing.assert_allclose(own, expected, rtol=2e-3)
 
 
-def test_the_same_likelihood_where_nothing_is_kept():
+def test_filters_side_by_side_are_those_one_by_one():
     rng = np.random.default_rng(0)
-    clock, values = np.arange(50.0), rng.normal(size=(50, 3))
-    kept, bare = forward(clock, values, 4, 0.1, True), forward(clock, values, 4, 0.1, False)
-    assert kept[3:] == bare[3:]
-    assert bare[0].shape == (0, 4, 3)
+    clock, values = np.cumsum(rng.uniform(0.5, 1.5, 50)), rng.normal(size=(50, 3))
+    scales = np.geomspace(1e-3, 3.0, 7)
+    states, _, _, quad, log_det, count = forward(clock, values, 4, scales, False)
+    assert states.shape == (0, 4, 3)
+    for k, scale in enumerate(scales):
+        kept = forward(clock, values, 4, np.array([scale]), True)
+        assert kept[0].shape == (50, 4, 3)
+        np.testing.assert_allclose([quad[k], log_det[k], count], [kept[3][0], kept[4][0], kept[5]], rtol=1e-12)

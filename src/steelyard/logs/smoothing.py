@@ -23,6 +23,7 @@ from steelyard.logs.spline_filter import WARM_UP, backward, forward
 _SEARCH_ROWS = 6000
 _NOISE_FLOOR = 1e-9
 _ORDERS = (3, 4, 5)
+_FINER = 17  # ratios tried within a decade of the best
 _LONG = 20.0  # periods of a low-pass, from which on there is one
 SMEARED = 2.0  # periods of a low-pass over which an end is felt
 _FINE = 10.0  # times the cut-off
@@ -82,10 +83,9 @@ def smooth(time: Array, values: Array, noise_dof: int | None = None, cutoff_hz: 
     _, order, ratio = min(_best_ratio(clock, centred, n) for n in _ORDERS)
     scale = ratio ** (1 / (2 * order))
     floor = (_NOISE_FLOOR * (np.ptp(y, axis=0).max() + 1e-12)) ** 2
-    scaled = clock * scale
-    states, cov, weights, quad, _, count = forward(scaled, centred, order, scale, True)
-    backward(scaled, centred, states, cov, weights)
-    noise = max(quad / max(count * y.shape[1] * share, 1.0), floor)
+    states, cov, weights, quad, _, count = forward(clock, centred, order, np.array([scale]), True)
+    backward(clock * scale, centred, states, cov, weights)
+    noise = max(float(quad[0]) / max(count * y.shape[1] * share, 1.0), floor)
     back = (scale / step) ** np.arange(order)
     bandwidth = scale / (2 * np.pi * step)
     rate = 1 / step
@@ -161,21 +161,32 @@ def _quintic(knots: Any, states: Any, variance: Any, times: Any, left: Any) -> A
 
 def _best_ratio(clock: Array, values: Array, order: int) -> tuple[float, int, float]:
     """Return the least cost, the order, and the most likely ratio of process to measurement noise per step."""
-    from scipy.optimize import minimize_scalar
-
     pieces = _pieces(len(clock))
+    size = float(np.abs(values).max()) + 1e-300
 
-    def cost(log_ratio: float) -> float:
-        scale = float(np.exp(log_ratio / (2 * order)))
-        found = [_likelihood(clock[p] * scale, values[p], order, scale) for p in pieces]
-        quad, log_det, count = np.sum(found, 0)
-        size = float(np.abs(values).max()) + 1e-300
-        return float(count * np.log(quad / count + (_NOISE_FLOOR * size) ** 2) + log_det)
+    def costs(log_ratios: Array) -> Array:
+        scales = np.exp(log_ratios / (2 * order))
+        quad, log_det, count = 0.0, 0.0, 0
+        for p in pieces:
+            *_, squares, logs, rows = forward(clock[p], values[p], order, scales, False)
+            quad, log_det, count = quad + squares / values.shape[1], log_det + logs, count + rows
+        return np.asarray(count * np.log(quad / count + (_NOISE_FLOOR * size) ** 2) + log_det)
 
-    grid = np.log(10.0) * np.arange(-4.0 * order, 4.1, 1.0)
-    best = float(grid[int(np.argmin([cost(g) for g in grid]))])
-    found = minimize_scalar(cost, bounds=(best - 2.4, best + 2.4), method="bounded", options={"xatol": 0.02})
-    return float(found.fun), order, float(np.exp(found.x))
+    decades = np.log(10.0) * np.arange(-4.0 * order, 4.1)
+    near = decades[np.argmin(costs(decades))] + np.log(10.0) * np.linspace(-1.0, 1.0, _FINER)
+    least, log_ratio = _lowest(near, costs(near))
+    return least, order, float(np.exp(log_ratio))
+
+
+def _lowest(at: Array, costs: Array) -> tuple[float, float]:
+    """Return the least of costs (K,) at even steps (K,), and where it is: that of the parabola through the three."""
+    k = int(np.argmin(costs))
+    if not 0 < k < len(at) - 1:
+        return float(costs[k]), float(at[k])
+    slope, bend = (costs[k + 1] - costs[k - 1]) / 2, costs[k + 1] - 2 * costs[k] + costs[k - 1]
+    if bend <= 0.0:
+        return float(costs[k]), float(at[k])
+    return float(costs[k] - slope**2 / (2 * bend)), float(at[k] - slope / bend * (at[1] - at[0]))
 
 
 def _pieces(rows: int) -> list[slice]:
@@ -184,8 +195,3 @@ def _pieces(rows: int) -> list[slice]:
         return [slice(0, rows)]
     each = _SEARCH_ROWS // 3
     return [slice(int(s), int(s) + each) for s in np.linspace(0, rows - each, 3)]
-
-
-def _likelihood(clock: Array, values: Array, order: int, scale: float) -> tuple[float, float, float]:
-    *_, quad, log_det, count = forward(clock, values, order, scale, False)
-    return float(quad) / values.shape[1], float(log_det), float(count)

@@ -11,52 +11,106 @@ from numba import njit
 
 _WIDE = 1e6  # variance of the start, where that of a measurement is 1
 WARM_UP = 6  # innovations left out of the likelihood: the start is not known
+_FACTORS = 16  # variances multiplied before a logarithm is taken: fewer than overflow, most of a logarithm saved
 
 
 @njit(cache=True, error_model="numpy")
-def forward(clock, values, order, density, keep):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Kalman filter with unit measurement noise and process density `density` in the given time unit.
+def forward(clock, values, order, scales, keep):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Kalman filters side by side, one for each of `scales` (L,): of the clock times a scale, at that process density.
 
-    Returns states (N, n, D), covariances (N, n, n), each with its measurement in it, and the inverse variance (N,) of
-    innovations, empty unless to be kept; and of the innovations the sum of squares over variances, that of the
-    logarithms of variances, and their number.
+    Measurement noise is 1. Returns of the first filter states (N, n, D) and covariances (N, n, n), each with its
+    measurement in it, and the inverse variance (N,) of innovations, empty unless to be kept; and of the innovations of
+    each the sum of squares over variances (L,), that of the logarithms of variances (L,), and their number.
     """
-    n, rows, channels = order, values.shape[0], values.shape[1]
+    n, rows, channels, lanes = order, values.shape[0], values.shape[1], len(scales)
     stored = rows if keep else 0
     states, covariances, weights = np.empty((stored, n, channels)), np.empty((stored, n, n)), np.empty(stored)
-    x, P = np.zeros((n, channels)), np.zeros((n, n))
-    for c in range(channels):
-        x[0, c] = values[0, c]
-    for i in range(n):
-        P[i, i] = _WIDE
-    F, room, gain = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-    quad, log_det, count = 0.0, 0.0, 0
+    x, P = np.zeros((n, channels, lanes)), np.zeros((n, n, lanes))
+    F, gain, row = np.zeros((n, lanes)), np.zeros((n, lanes)), np.zeros((n, lanes))
+    S, product, quad, log_det = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes), np.zeros(lanes)
+    for w in range(lanes):
+        F[0, w] = product[w] = 1.0
+        for c in range(channels):
+            x[0, c, w] = values[0, c]
+        for i in range(n):
+            P[i, i, w] = _WIDE
     for k in range(rows):
         if k > 0:
-            dt = clock[k] - clock[k - 1]
-            _transition(F, dt)
-            _predict(x, P, F, density * dt, room)
-        S = P[0, 0] + 1.0
-        for i in range(n):
-            gain[i] = P[i, 0] / S
-        for c in range(channels):
-            e = values[k, c] - x[0, c]
-            for i in range(n):
-                x[i, c] += gain[i] * e
-            if k >= WARM_UP:
-                quad += e * e / S
+            _predict(x, P, F, scales, clock[k] - clock[k - 1])
+        for w in range(lanes):
+            S[w] = P[0, 0, w] + 1.0
+        _update(x, P, S, values[k], gain, row, quad, k >= WARM_UP)
         if k >= WARM_UP:
-            log_det += np.log(S)
-            count += 1
-        _update(P, gain, room)
+            for w in range(lanes):
+                product[w] *= S[w]
+        if k % _FACTORS == 0 or k == rows - 1:
+            for w in range(lanes):
+                log_det[w] += np.log(product[w])
+                product[w] = 1.0
         if keep:
-            weights[k] = 1 / S
+            weights[k] = 1 / S[0]
             for i in range(n):
                 for c in range(channels):
-                    states[k, i, c] = x[i, c]
+                    states[k, i, c] = x[i, c, 0]
                 for j in range(n):
-                    covariances[k, i, j] = P[i, j]
-    return states, covariances, weights, quad, log_det, count
+                    covariances[k, i, j] = P[i, j, 0] if i < j else P[j, i, 0]
+    return states, covariances, weights, quad, log_det, max(rows - WARM_UP, 0)
+
+
+@njit(cache=True, error_model="numpy")
+def _predict(x, P, F, scales, dt):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Move states (n, D, L) and the upper half of covariances (n, n, L) one step on, in place.
+
+    F (n, L) are the entries dt^k / k! of the transition. White noise, integrated over the step, adds
+    F_a F_b / (a + b + 1) of its size with a = n - 1 - i and b = n - 1 - j.
+    """
+    n, channels, lanes = x.shape
+    for i in range(1, n):
+        for w in range(lanes):
+            F[i, w] = F[i - 1, w] * scales[w] * (dt / i)
+    for i in range(n):
+        for m in range(i + 1, n):
+            for c in range(channels):
+                for w in range(lanes):
+                    x[i, c, w] += F[m - i, w] * x[m, c, w]
+        for j in range(i, n):
+            for m in range(i + 1, n):
+                a, b = (m, j) if m < j else (j, m)
+                for w in range(lanes):
+                    P[i, j, w] += F[m - i, w] * P[a, b, w]
+    for i in range(n):
+        for j in range(i, n):
+            for m in range(j + 1, n):
+                for w in range(lanes):
+                    P[i, j, w] += F[m - j, w] * P[i, m, w]
+            share = dt / (2 * n - 1 - i - j)
+            for w in range(lanes):
+                P[i, j, w] += scales[w] ** 2 * share * F[n - 1 - i, w] * F[n - 1 - j, w]
+
+
+@njit(cache=True, error_model="numpy")
+def _update(x, P, S, measured, gain, row, quad, counts):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Take one measurement (D,) in, in place; Joseph's form keeps covariances positive with a very wide start.
+
+    (1 - K h^T) is taken to the right side last: what the first leaves of a wide row is rounded, and that mends it.
+    """
+    n, channels, lanes = x.shape
+    for i in range(n):
+        for w in range(lanes):
+            row[i, w] = P[0, i, w]
+            gain[i, w] = P[0, i, w] / S[w]
+    for c in range(channels):
+        for w in range(lanes):
+            e = measured[c] - x[0, c, w]
+            for i in range(n):
+                x[i, c, w] += gain[i, w] * e
+            if counts:
+                quad[w] += e * e / S[w]
+    for i in range(n):
+        for j in range(i, n):
+            for w in range(lanes):
+                left = row[j, w] - gain[j, w] * row[0, w]
+                P[i, j, w] = P[i, j, w] - gain[j, w] * row[i, w] - left * gain[i, w] + gain[i, w] * gain[j, w]
 
 
 @njit(cache=True, error_model="numpy")
@@ -66,44 +120,6 @@ def _transition(F, dt):  # type: ignore[no-untyped-def]  # pragma: no cover - co
         F[i, i] = 1.0
         for j in range(i + 1, len(F)):
             F[i, j] = F[i, j - 1] * dt / (j - i)
-
-
-@njit(cache=True, error_model="numpy")
-def _predict(x, P, F, noise, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Move state and covariance one step on, in place.
-
-    White noise, integrated over the step, adds noise F_0a F_0b / (a + b + 1) with a = n - 1 - i and b = n - 1 - j.
-    """
-    n = len(P)
-    for i in range(n):
-        for c in range(x.shape[1]):
-            total = 0.0
-            for m in range(i, n):
-                total += F[i, m] * x[m, c]
-            x[i, c] = total
-        for j in range(n):
-            total = 0.0
-            for m in range(i, n):
-                total += F[i, m] * P[m, j]
-            room[i, j] = total
-    for i in range(n):
-        for j in range(n):
-            total = noise * F[0, n - 1 - i] * F[0, n - 1 - j] / (2 * n - 1 - i - j)
-            for m in range(j, n):
-                total += room[i, m] * F[j, m]
-            P[i, j] = total
-
-
-@njit(cache=True)
-def _update(P, gain, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Take one measurement into the covariance, in place; Joseph's form keeps it positive with a very wide start."""
-    n = len(P)
-    for i in range(n):
-        for j in range(n):
-            room[i, j] = P[i, j] - gain[i] * P[0, j]
-    for i in range(n):
-        for j in range(n):
-            P[i, j] = room[i, j] - room[i, 0] * gain[j] + gain[i] * gain[j]
 
 
 @njit(cache=True)
