@@ -175,7 +175,8 @@ def _columns(log: MotionLog) -> tuple[Array, Array, Array, Array, Array]:
 
 def regressors(log: MotionLog) -> Array:
     """Return A (N, 6, 10), so that the wrench of row n without bias is A[n] phi."""
-    return np.asarray(np.einsum("kij,nj->nik", basis(), features(log)[:, MOTION]))
+    by_feature = basis().transpose(2, 1, 0).reshape(-1, 60)
+    return np.asarray(features(log)[:, MOTION] @ by_feature).reshape(-1, 6, 10)
 
 
 def _groups(log: MotionLog, by_block: bool) -> tuple[Integers, Integers]:

@@ -122,17 +122,10 @@ class Rows:
         """Whether they are of stretches enough to tell a spread by leaving each out."""
         return int(self.block.max()) + 1 >= FEWEST_BLOCKS
 
-    def _with(self, extra: Array | None) -> Array:
-        return self.columns if extra is None else np.concatenate([self.columns, extra], 2)
-
     def solve(self, extra: Array | None = None, jackknife: bool = False) -> FullFit:
         """Return the solution with extra columns (N, 6, k)."""
-        X = self._with(extra)
-        both = np.concatenate([X, self.values[:, :, None]], 2) * np.sqrt(self.weights)[:, :, None]
-        # Blocks are few and wide: to gather them for one product (`block_scatter`) would cost more than it saves.
-        blocks = range(int(self.block.max()) + 1)
-        scatter = np.stack([_gram(both[self.block == b]) for b in blocks]) if jackknife else _gram(both)[None]
-        total, size = scatter.sum(0), X.shape[2]
+        scatter = self._scatter(extra, jackknife)
+        total, size = scatter.sum(0), scatter.shape[1] - 1
         solution = left_out.solutions(total[None], RANK, 0.0)[0]
         left = float(total[size, size] - 2 * solution @ total[:size, size] + solution @ total[:size, :size] @ solution)
         covariance = np.zeros((size, size))
@@ -140,13 +133,46 @@ class Rows:
             covariance = left_out.jackknife(left_out.solutions(total - scatter, RANK, 0.0) - solution)
         return FullFit(solution, covariance, max(left, 0.0), self.columns.shape[2])
 
+    def _scatter(self, extra: Array | None, by_block: bool) -> Array:
+        """Return products (B, p, p) of weighted columns, extra columns (N, 6, k) and values, by block or of all."""
+        weighed, own = self._own
+        own = own if by_block else own.sum(0, keepdims=True)
+        if extra is None:
+            return own
+        added, size = self._weighed(extra), self.columns.shape[2]
+        rows = self._stretches[1] if by_block else [slice(None)]
+        across = np.stack([added[r].T @ weighed[r] for r in rows])
+        within = np.stack([added[r].T @ added[r] for r in rows])
+        both = np.block([[own, np.swapaxes(across, 1, 2)], [across, within]])
+        values_last = np.r_[:size, size + 1 : both.shape[1], size]
+        return np.asarray(both[:, values_last[:, None], values_last])
+
+    @cached_property
+    def _own(self) -> tuple[Array, Array]:
+        """Weighted columns and values (6 N, p), and their products (B, p, p) by block: every fit has them."""
+        weighed = self._weighed(np.concatenate([self.columns, self.values[:, :, None]], 2))
+        return weighed, np.stack([weighed[r].T @ weighed[r] for r in self._stretches[1]])
+
+    def _weighed(self, columns: Array) -> Array:
+        """Return columns (N, 6, k) by the roots of their weights, block after block, (6 N, k)."""
+        weighed, (order, _) = columns * np.sqrt(self.weights)[:, :, None], self._stretches
+        return (weighed if order is None else weighed[order]).reshape(-1, columns.shape[2])
+
+    @cached_property
+    def _stretches(self) -> tuple[Integers | None, list[slice]]:
+        """The order (N,) of rows, block after block, None if they lie so, and which six-fold rows each block is then."""
+        ends = 6 * np.cumsum(np.bincount(self.block))
+        sorted_already = bool((np.diff(self.block) >= 0).all())
+        order = None if sorted_already else np.argsort(self.block, kind="stable")
+        return order, [slice(int(a), int(b)) for a, b in zip((0, *ends[:-1]), ends, strict=True)]
+
     def told(self, extra: Array, least: float) -> Array:
         """Return the combinations (k, j) of extra columns (N, 6, k) that no body with a bias mimics.
 
         least  share of a combination's squares, its columns scaled alike, that the other columns must leave
         """
-        both = self._with(extra) * np.sqrt(self.weights)[:, :, None]
-        gram, size = _gram(both), self.columns.shape[2]
+        size = self.columns.shape[2]
+        gram = self._scatter(extra, False)[0, :-1, :-1]
         scale = np.sqrt(np.maximum(np.diag(gram)[size:], _SMALLEST**2))
         across = gram[size:, :size]
         rest = gram[size:, size:] - across @ inverse_scaled(gram[:size, :size].copy(), RANK) @ across.T
@@ -166,7 +192,9 @@ class Rows:
 
     def _missed(self, fit: FullFit, extra: Array | None = None) -> Array:
         """Return the weighted residuals (N, 6)."""
-        return np.asarray((self.values - self._with(extra) @ fit.solution) * np.sqrt(self.weights))
+        told = self.columns @ fit.solution[: fit.own]
+        told = told if extra is None else told + extra @ fit.extra
+        return np.asarray((self.values - told) * np.sqrt(self.weights))
 
     @cached_property
     def _second(self) -> Integers:
@@ -213,11 +241,6 @@ def force_left(log: MotionLog) -> float:
     """Return how much of the forces (rms, N) one body with a bias leaves in a log."""
     rows, _ = Rows.of(log)
     return float((rows.values - rows.columns @ rows.solve().solution)[:, 3:].std())
-
-
-def _gram(rows: Array) -> Array:
-    flat = rows.reshape(-1, rows.shape[2])
-    return np.asarray(flat.T @ flat)
 
 
 def _weights(rows: Rows, solution: Array) -> Array:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -71,7 +72,7 @@ class Glance:
     def __len__(self) -> int:
         return len(self.wrench)
 
-    @property
+    @cached_property
     def still(self) -> Glance:
         """The same as if nothing told the acceleration."""
         return replace(self, acceleration=None)
@@ -100,10 +101,20 @@ class Glance:
         )
         if self.rate is None:
             return Seen(wrench, pull, dead=self.dead)
-        lever, spin = _turning(rotation, self.rate)
-        flat = np.concatenate([wrench, pull, lever.reshape(-1, 9), spin.reshape(-1, 18)], 1)
-        parts = np.split(self.smooth(flat), [6, 9, 18], axis=1)
-        return Seen(parts[0], parts[1], parts[2].reshape(-1, 3, 3), parts[3].reshape(-1, 3, 6), self.dead)
+        wrench, pull = np.split(self.smooth(np.concatenate([wrench, pull], 1)), [6], axis=1)
+        turns = self._own_turns if rotation is self.rotation else None
+        return Seen(wrench, pull, *(turns or self._turns(rotation, self.rate)), self.dead)
+
+    @cached_property
+    def _own_turns(self) -> tuple[Array, Array] | None:
+        """What the own rotations add by turning: readings share it."""
+        return None if self.rotation is None or self.rate is None else self._turns(self.rotation, self.rate)
+
+    def _turns(self, rotation: Array, rate: float) -> tuple[Array, Array]:
+        """Return lever (M, 3, 3) and spin (M, 3, 6) of rotations (N, 3, 3), low-passed."""
+        lever, spin = _turning(rotation, rate)
+        both = self.smooth(np.concatenate([lever.reshape(-1, 9), spin.reshape(-1, 18)], 1))
+        return both[:, :9].reshape(-1, 3, 3), both[:, 9:].reshape(-1, 3, 6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,9 +149,14 @@ def _turning(rotation: Array, rate: float) -> tuple[Array, Array]:
     alpha = np.gradient(omega, 1 / rate, axis=0)
     across = cross_matrix(omega)
     lever = lever_matrix(omega, alpha)
-    entries = forms.inertia_matrix(np.eye(10)[4:])
-    spin = np.einsum("kij,nj->nik", entries, alpha) + across @ np.einsum("kij,nj->nik", entries, omega)
+    spin = _by_entries(alpha) + across @ _by_entries(omega)
     return lever, spin
+
+
+def _by_entries(vectors: Array) -> Array:
+    """Return the derivative (N, 3, 6) of I v by the entries of the inertia, for vectors v (N, 3)."""
+    entries = forms.inertia_matrix(np.eye(10)[4:])
+    return np.asarray(vectors @ entries.transpose(2, 1, 0).reshape(3, 18)).reshape(-1, 3, 6)
 
 
 def angular_velocity(rotation: Array, rate: float) -> Array:
