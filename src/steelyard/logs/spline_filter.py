@@ -59,7 +59,7 @@ def forward(clock, values, order, density, keep):  # type: ignore[no-untyped-def
     return states, covariances, weights, quad, log_det, count
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, inline="always")
 def _transition(F, dt):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Set F (n, n), upper triangular, of a step dt: F_ij = dt^(j - i) / (j - i)!."""
     for i in range(len(F)):
@@ -68,7 +68,7 @@ def _transition(F, dt):  # type: ignore[no-untyped-def]  # pragma: no cover - co
             F[i, j] = F[i, j - 1] * dt / (j - i)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, inline="always")
 def _predict(x, P, F, noise, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Move state and covariance one step on, in place.
 
@@ -94,7 +94,7 @@ def _predict(x, P, F, noise, room):  # type: ignore[no-untyped-def]  # pragma: n
             P[i, j] = total
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _update(P, gain, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Take one measurement into the covariance, in place; Joseph's form keeps it positive with a very wide start."""
     n = len(P)
@@ -106,7 +106,7 @@ def _update(P, gain, room):  # type: ignore[no-untyped-def]  # pragma: no cover 
             P[i, j] = room[i, j] - room[i, 0] * gain[j] + gain[i] * gain[j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def backward(clock, values, states, covariances, weights):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Take what comes later into states (N, n, D) and covariances (N, n, n), in place; no matrix is inverted.
 
@@ -131,7 +131,7 @@ def backward(clock, values, states, covariances, weights):  # type: ignore[no-un
             _before_step(a, A, F, room[0])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _correct(x, P, a, A, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Set x - P a and P - P A P, in place."""
     n = len(P)
@@ -154,7 +154,7 @@ def _correct(x, P, a, A, room):  # type: ignore[no-untyped-def]  # pragma: no co
             P[i, j] -= whole[i, j]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _before_measurement(a, A, gain, left, weight):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Carry the adjoint back over a measurement, in place: C^T a - h e / S, C^T A C + h h^T / S; C = 1 - K h^T."""
     n = len(A)
@@ -176,7 +176,7 @@ def _before_measurement(a, A, gain, left, weight):  # type: ignore[no-untyped-de
     A[0, 0] += weight
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _before_step(a, A, F, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Carry the adjoint back over a step, in place: F^T a, F^T A F; F is upper triangular."""
     n = len(A)
