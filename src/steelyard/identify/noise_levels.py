@@ -140,7 +140,7 @@ def _wrench_levels(
     linear = reweighted(T, moments.scatter, acceleration, wrench, 4)
     K = residual_map_of(T, linear)
     # Parameters that the data fix take their share of the residual degrees of freedom away.
-    lost = _lost(T, moments.scatter, weights_at(linear, T, acceleration, wrench), linear) / (3 * moments.samples)
+    lost = _lost(T, moments.scatter, weights_at(K, acceleration, wrench), linear) / (3 * moments.samples)
     lost = np.minimum(lost, MOST_LOST)
     for group, c in enumerate(moments.noise_class):
         rows = moments.counts[group]

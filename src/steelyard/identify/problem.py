@@ -159,7 +159,7 @@ class Problem:
 
     def weights_at(self, linear: Array) -> Array:
         """Return the weights (C, 6, 6) of the rows at the linear parameters (p,), noise of the acceleration counted."""
-        return np.asarray(weights_at(linear, self.T, self.acceleration, self.wrench))
+        return np.asarray(weights_at(self.residual_map(linear), self.acceleration, self.wrench))
 
     def information(self, linear: Array) -> tuple[Array, Array, Array]:
         """Return `noise_cost.information` (p, p) of all rows at the linear parameters (p,)."""

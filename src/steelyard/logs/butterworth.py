@@ -40,8 +40,11 @@ def _sections(order: int, cutoff: float) -> Array:
 @numba.njit(cache=True)
 def _through(sections: Array, rows: Array) -> Array:
     """Return `rows` (N, D), overwritten, after all sections, as if the first row had lasted for ever before."""
-    for b, a1, a2 in sections:
-        newer, older = (1 - b) * rows[0], (b - a2) * rows[0]
+    newer, older = np.empty(rows.shape[1]), np.empty(rows.shape[1])
+    for s in range(len(sections)):
+        b, a1, a2 = sections[s, 0], sections[s, 1], sections[s, 2]
+        for d in range(rows.shape[1]):
+            newer[d], older[d] = (1 - b) * rows[0, d], (b - a2) * rows[0, d]
         for n in range(len(rows)):
             for d in range(rows.shape[1]):
                 x = rows[n, d]

@@ -62,12 +62,12 @@ def _turned(states: Any) -> Any:
     return matrix, omega, alpha
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, inline="always")
 def _inner(q: Any, p: Any) -> Any:
     return q[0] * p[0] + q[1] * p[1] + q[2] * p[2] + q[3] * p[3]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, inline="always")
 def _conjugate_times(q: Any, p: Any, i: int) -> Any:
     """Return entry i of the vector part of q* p for quaternions (4,), scalar first."""
     j, k = 1 + (i + 1) % 3, 1 + (i + 2) % 3

@@ -132,7 +132,8 @@ def _below(whole: Smooth, cutoff_hz: float) -> Smooth:
     inner = slice(end, len(even) - end)
     if len(even[inner]) < 2 * WARM_UP:
         return whole
-    return replace(whole, time=even[inner], states=check.frozen(states[inner]), variance=check.frozen(variance[inner]))
+    even, states, variance = (check.frozen(v[inner]) for v in (even, states, variance))
+    return replace(whole, time=even, states=states, variance=variance)
 
 
 @njit(cache=True, error_model="numpy")
@@ -148,14 +149,15 @@ def _quintic(knots: Any, states: Any, variance: Any, times: Any, left: Any) -> A
         for d in range(3):
             between[k, d] = variance[left[k], d] + s * (variance[left[k] + 1, d] - variance[left[k], d])
         for c in range(states.shape[2]):
-            gap = b[0, c] - a[0, c] - a[1, c] * h - a[2, c] * h**2 / 2
-            slope = (b[1, c] - a[1, c] - a[2, c] * h) * h
-            bend = (b[2, c] - a[2, c]) * h**2
+            value, rate, rise = a[0, c], a[1, c], a[2, c]
+            gap = b[0, c] - value - rate * h - rise * h**2 / 2
+            slope = (b[1, c] - rate - rise * h) * h
+            bend = (b[2, c] - rise) * h**2
             c3, c4 = 10 * gap - 4 * slope + bend / 2, -15 * gap + 7 * slope - bend
             c5 = 6 * gap - 3 * slope + bend / 2
-            out[k, 0, c] = a[0, c] + a[1, c] * h * s + a[2, c] * (h * s) ** 2 / 2 + s**3 * (c3 + s * (c4 + s * c5))
-            out[k, 1, c] = a[1, c] + a[2, c] * h * s + s**2 * (3 * c3 + s * (4 * c4 + s * 5 * c5)) / h
-            out[k, 2, c] = a[2, c] + s * (6 * c3 + s * (12 * c4 + s * 20 * c5)) / h**2
+            out[k, 0, c] = value + rate * h * s + rise * (h * s) ** 2 / 2 + s**3 * (c3 + s * (c4 + s * c5))
+            out[k, 1, c] = rate + rise * h * s + s**2 * (3 * c3 + s * (4 * c4 + s * 5 * c5)) / h
+            out[k, 2, c] = rise + s * (6 * c3 + s * (12 * c4 + s * 20 * c5)) / h**2
     return out, between
 
 

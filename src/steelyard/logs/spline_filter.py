@@ -57,7 +57,7 @@ def forward(clock, values, order, scales, keep):  # type: ignore[no-untyped-def]
     return states, covariances, weights, quad, log_det, max(rows - WARM_UP, 0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, inline="always")
 def _predict(x, P, F, scales, dt):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Move states (n, D, L) and the upper half of covariances (n, n, L) one step on, in place.
 
@@ -88,7 +88,7 @@ def _predict(x, P, F, scales, dt):  # type: ignore[no-untyped-def]  # pragma: no
                 P[i, j, w] += scales[w] ** 2 * share * F[n - 1 - i, w] * F[n - 1 - j, w]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, inline="always")
 def _update(x, P, S, measured, gain, row, quad, counts):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Take one measurement (D,) in, in place; Joseph's form keeps covariances positive with a very wide start.
 
@@ -113,7 +113,7 @@ def _update(x, P, S, measured, gain, row, quad, counts):  # type: ignore[no-unty
                 P[i, j, w] = P[i, j, w] - gain[j, w] * row[i, w] - left * gain[i, w] + gain[i, w] * gain[j, w]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, inline="always")
 def _transition(F, dt):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Set F (n, n), upper triangular, of a step dt: F_ij = dt^(j - i) / (j - i)!."""
     for i in range(len(F)):
@@ -122,7 +122,7 @@ def _transition(F, dt):  # type: ignore[no-untyped-def]  # pragma: no cover - co
             F[i, j] = F[i, j - 1] * dt / (j - i)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def backward(clock, values, states, covariances, weights):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Take what comes later into states (N, n, D) and covariances (N, n, n), in place; no matrix is inverted.
 
@@ -147,7 +147,7 @@ def backward(clock, values, states, covariances, weights):  # type: ignore[no-un
             _before_step(a, A, F, room[0])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _correct(x, P, a, A, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Set x - P a and P - P A P, in place."""
     n = len(P)
@@ -170,7 +170,7 @@ def _correct(x, P, a, A, room):  # type: ignore[no-untyped-def]  # pragma: no co
             P[i, j] -= whole[i, j]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _before_measurement(a, A, gain, left, weight):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Carry the adjoint back over a measurement, in place: C^T a - h e / S, C^T A C + h h^T / S; C = 1 - K h^T."""
     n = len(A)
@@ -192,7 +192,7 @@ def _before_measurement(a, A, gain, left, weight):  # type: ignore[no-untyped-de
     A[0, 0] += weight
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _before_step(a, A, F, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Carry the adjoint back over a step, in place: F^T a, F^T A F; F is upper triangular."""
     n = len(A)

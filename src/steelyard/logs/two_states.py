@@ -12,13 +12,16 @@ from steelyard.check import Array, Integers
 def cheapest_path(step: Array, cost: Array) -> Integers:
     """Return the state, 0 or 1, of each row (N,), at costs (N, 2) and those of a step (N - 1, 2, 2) from a to b."""
     rows = len(cost)
-    came, path, total = np.zeros((rows, 2), np.int64), np.zeros(rows, np.int64), cost[:1].copy().reshape(-1)
+    came, path = np.empty((rows, 2), np.int64), np.empty(rows, np.int64)
+    if rows == 0:
+        return path
+    zero, one = cost[0, 0], cost[0, 1]
     for k in range(1, rows):
-        one, other = total + step[k - 1, :, 0], total + step[k - 1, :, 1]
-        came[k, 0], came[k, 1] = int(one[1] < one[0]), int(other[1] < other[0])
-        total[0], total[1] = min(one[0], one[1]) + cost[k, 0], min(other[0], other[1]) + cost[k, 1]
-    if rows:
-        path[rows - 1] = int(total[1] < total[0])
+        stayed, fell = zero + step[k - 1, 0, 0], one + step[k - 1, 1, 0]
+        rose, held = zero + step[k - 1, 0, 1], one + step[k - 1, 1, 1]
+        came[k, 0], came[k, 1] = int(fell < stayed), int(held < rose)
+        zero, one = min(stayed, fell) + cost[k, 0], min(rose, held) + cost[k, 1]
+    path[rows - 1] = int(one < zero)
     for k in range(rows - 1, 0, -1):
         path[k - 1] = came[k, path[k]]
     return path

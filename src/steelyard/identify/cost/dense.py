@@ -13,13 +13,13 @@ import numpy as np
 from steelyard.check import Array
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def eigen(matrix: Array) -> tuple[Array, Array]:
     """Return the eigenvalues (n,), ascending, and eigenvectors (n, n), in columns, of a symmetric matrix."""
     return np.linalg.eigh(matrix)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def add_product(out: Array, a: Array, b: Array) -> None:
     """Add a b to `out` (n, m), with a (n, k) and b (k, m); zeros in a cost nothing."""
     for i in range(a.shape[0]):
@@ -30,7 +30,7 @@ def add_product(out: Array, a: Array, b: Array) -> None:
                     out[i, j] += value * b[k, j]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def product(a: Array, b: Array) -> Array:
     """Return a b (n, m) of a (n, k) and b (k, m)."""
     out = np.zeros((a.shape[0], b.shape[1]))
@@ -38,7 +38,7 @@ def product(a: Array, b: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def product_transposed(a: Array, b: Array) -> Array:
     """Return a b^T (n, m) of a (n, k) and b (m, k)."""
     out = np.empty((a.shape[0], b.shape[0]))
@@ -51,7 +51,7 @@ def product_transposed(a: Array, b: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def transposed(a: Array) -> Array:
     """Return a^T (m, n) of a (n, m), C-ordered."""
     out = np.empty((a.shape[1], a.shape[0]))
@@ -61,7 +61,7 @@ def transposed(a: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def times(a: Array, x: Array) -> Array:
     """Return a x (n,) of a (n, m) and x (m,)."""
     out = np.empty(a.shape[0])
@@ -73,7 +73,7 @@ def times(a: Array, x: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def inner(a: Array, b: Array) -> float:
     """Return a . b of two vectors (n,)."""
     total = 0.0
@@ -82,7 +82,7 @@ def inner(a: Array, b: Array) -> float:
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def moved(x: Array, step: Array, share: float) -> Array:
     """Return x + share step of two vectors (n,)."""
     out = np.empty(len(x))
@@ -91,7 +91,7 @@ def moved(x: Array, step: Array, share: float) -> Array:
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def mirror(a: Array) -> None:
     """Copy what is below the diagonal of a (n, n) above it, in place."""
     for i in range(a.shape[0]):
@@ -99,7 +99,7 @@ def mirror(a: Array) -> None:
             a[j, i] = a[i, j]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy")
 def cholesky(matrix: Array, least: float) -> tuple[Array, bool]:
     """Return L (n, n) with L L^T = matrix, and whether all squared pivots are above `least`; others count as that."""
     n = matrix.shape[0]
@@ -118,7 +118,7 @@ def cholesky(matrix: Array, least: float) -> tuple[Array, bool]:
     return low, positive
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy")
 def solved(low: Array, g: Array) -> Array:
     """Return x (n,) of L L^T x = g, with L (n, n) lower and g (n,)."""
     n = len(g)
@@ -136,7 +136,7 @@ def solved(low: Array, g: Array) -> Array:
     return x
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def downhill(gradient: Array, hessian: Array, least: float) -> Array:
     """Return the Newton step (n,), with negative curvatures turned round (saddle-free) where the Hessian has any.
 
@@ -157,7 +157,7 @@ def downhill(gradient: Array, hessian: Array, least: float) -> Array:
     return step
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def inverse_of(low: Array) -> Array:
     """Return (L L^T)^-1 (n, n) of L (n, n) lower."""
     n = low.shape[0]

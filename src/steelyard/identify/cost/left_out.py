@@ -10,7 +10,7 @@ import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.identify.cost.dense import times
-from steelyard.identify.cost.linear import inverse_scaled
+from steelyard.identify.cost.linear import pseudo_inverse
 
 # Columns that hold less than this of all squares say nothing.
 NOTHING = 1e-200
@@ -47,7 +47,7 @@ def solutions(scatter: Array, tolerance: float, ridge: float) -> Array:
         if whole > NOTHING:
             for i in range(size):
                 matrix[i, i] += ridge * whole
-            x = times(inverse_scaled(matrix, tolerance), right)
+            x = times(pseudo_inverse(matrix, tolerance), right)
             for i in range(size):
                 out[b, i] = x[i]
     return out

@@ -7,7 +7,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.cost.dense import cholesky, eigen, inverse_of, mirror, product_transposed, times
-from steelyard.identify.cost.noise_cost import add_products, entries, weights_at
+from steelyard.identify.cost.noise_cost import add_products, entries, residual_map_of, weights_at
 
 # Directions whose information, after scaling the columns to one, is below this share of the largest are left at zero.
 RANK_TOLERANCE = 1e-12
@@ -55,10 +55,9 @@ def unit_diagonal(matrix: Array) -> tuple[Array, Array]:
     return out, scale
 
 
-@numba.njit(cache=True)
 def solve_scaled(H: Array, g: Array) -> Array:
     """Return the least-norm x (p,) of H x = g after scaling H (p, p) to a unit diagonal."""
-    return times(inverse_scaled(H), g)
+    return times(pseudo_inverse(H, RANK_TOLERANCE), g)
 
 
 def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, passes: int) -> Array:
@@ -70,7 +69,7 @@ def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, pas
     """
     linear = np.zeros(len(T))
     for _ in range(passes):
-        H, g = normal_equations(T, scatter, weights_at(linear, T, acceleration, wrench))
+        H, g = normal_equations(T, scatter, weights_at(residual_map_of(T, linear), acceleration, wrench))
         linear = solve_scaled(H + loosest(linear), g)
     return linear
 
@@ -91,8 +90,13 @@ def fitted(H: Array, prior: Array) -> float:
     return float(np.trace(inverse_scaled(H + prior) @ H))
 
 
-@numba.njit(cache=True)
 def inverse_scaled(matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
+    """Return `pseudo_inverse`: a kernel that had a default would be compiled with it and without."""
+    return pseudo_inverse(matrix, tolerance)
+
+
+@numba.njit(cache=True)
+def pseudo_inverse(matrix: Array, tolerance: float) -> Array:
     """Return the pseudo-inverse of a symmetric matrix (p, p) after scaling it to a unit diagonal.
 
     tolerance  directions with an eigenvalue below this share of the largest are left at zero
@@ -119,31 +123,21 @@ def inverse_scaled(matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
     return product_transposed(left, right)
 
 
-@numba.njit(cache=True)
 def nonnegative(matrix: Array, reference: Array) -> Array:
     """Return a symmetric matrix (p, p), negative eigenvalues set to zero, scaled by the diagonal of `reference` (p, p).
 
     Noise taken out of a scatter matrix leaves directions that the log does not excite slightly below zero.
     """
-    size = matrix.shape[0]
-    scale, scaled = np.ones(size), np.empty((size, size))
-    for i in range(size):
-        if reference[i, i] > 0.0:
-            scale[i] = np.sqrt(reference[i, i])
-    for i in range(size):
-        for j in range(size):
-            scaled[i, j] = 0.5 * (matrix[i, j] + matrix[j, i]) / (scale[i] * scale[j])
+    diagonal = np.diag(reference)
+    scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    scaled = 0.5 * (matrix + matrix.T) / (scale[:, None] * scale)
     if cholesky(scaled, RANK_TOLERANCE)[1]:
         return matrix
     values, vectors = eigen(scaled)
     if values[0] >= 0.0:
         return matrix
-    left, right = np.empty((size, size)), np.empty((size, size))
-    for k in range(size):
-        for i in range(size):
-            right[i, k] = vectors[i, k] * scale[i]
-            left[i, k] = right[i, k] * max(values[k], 0.0)
-    return product_transposed(left, right)
+    right = np.ascontiguousarray(vectors * scale[:, None])
+    return product_transposed(right * np.maximum(values, 0.0), right)
 
 
 def without_bias(H: Array, V: Array) -> tuple[Array, Array, Array, Array]:

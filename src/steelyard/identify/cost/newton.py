@@ -86,7 +86,7 @@ def vector_of(P: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, inline="always")
 def _adjoint(g: Array) -> Array:
     """Return Gamma (4, 4), so that g . vector_of(dP) = <Gamma, dP> for symmetric dP."""
     out = np.zeros((4, 4))

@@ -54,16 +54,9 @@ def add_products(out: Array, T: Entries, W: Array, S: Array, factor: float) -> N
             out[p, q] += factor * total
 
 
-@numba.njit(cache=True)
 def weight(K: Array, acceleration: Array, wrench: Array) -> Array:
     """Return W = (Sigma_w + M Sigma_a M^T)^-1 (6, 6) at K (6, Z) for variances (6,) and (6,)."""
-    V = np.zeros((6, 6))
-    for i in range(6):
-        V[i, i] = wrench[i]
-        for j in range(6):
-            for k in range(6):
-                V[i, j] += K[i, k] * acceleration[k] * K[j, k]
-    return inverse_of(cholesky(V, 1e-300)[0])
+    return np.asarray(weights_at(K, acceleration[None], wrench[None])[0])
 
 
 @numba.njit(cache=True)
@@ -82,25 +75,33 @@ def residual_map_of(T: Array, linear: Array) -> Array:
 
 
 @numba.njit(cache=True)
-def weights_at(linear: Array, T: Array, acceleration: Array, wrench: Array) -> Array:
-    """Return W (C, 6, 6) of every class at the linear parameters (p,), for variances (C, 6) and (C, 6)."""
-    K = residual_map_of(T, linear)
-    out = np.empty((len(wrench), 6, 6))
+def weights_at(K: Array, acceleration: Array, wrench: Array) -> Array:
+    """Return W (C, 6, 6) of every class, as `weight` does, at K (6, Z) for variances (C, 6) and (C, 6)."""
+    out, V = np.empty((len(wrench), 6, 6)), np.empty((6, 6))
     for c in range(len(wrench)):
-        W = weight(K, acceleration[c], wrench[c])
+        for i in range(6):
+            for j in range(6):
+                V[i, j] = wrench[c, i] if i == j else 0.0
+                for k in range(6):
+                    V[i, j] += K[i, k] * acceleration[c, k] * K[j, k]
+        W = inverse_of(cholesky(V, 1e-300)[0])
         for i in range(6):
             for j in range(6):
                 out[c, i, j] = W[i, j]
     return out
 
 
-@numba.njit(cache=True)
+# The weights are found apart: a kernel that found its own would be compiled with all that inverts a matrix in it.
 def value(K: Array, scatter: Array, acceleration: Array, wrench: Array) -> tuple[float, Array]:
     """Return Q at K (6, Z) and the sum of r^2 (6,), over groups: scatter (C, Z, Z), variances (C, 6) and (C, 6)."""
+    return _value(K, scatter, weights_at(K, acceleration, wrench))
+
+
+@numba.njit(cache=True)
+def _value(K: Array, scatter: Array, weights: Array) -> tuple[float, Array]:
     total, square = 0.0, np.zeros(6)
     for c in range(scatter.shape[0]):
-        W = weight(K, acceleration[c], wrench[c])
-        C = product_transposed(product(K, scatter[c]), K)
+        W, C = weights[c], product_transposed(product(K, scatter[c]), K)
         for i in range(6):
             square[i] += C[i, i]
             for j in range(6):
@@ -108,12 +109,16 @@ def value(K: Array, scatter: Array, acceleration: Array, wrench: Array) -> tuple
     return total, square
 
 
-@numba.njit(cache=True)
 def derivatives(K: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array) -> tuple[float, Array, Array]:
     """Return Q, its gradient (p,) and exact Hessian (p, p) in the linear parameters, for the design T (p, 6, Z).
 
     K (6, Z), scatter (C, Z, Z) and the variances (C, 6) are those of `value`.
     """
+    return _derivatives(K, T, scatter, acceleration, weights_at(K, acceleration, wrench))
+
+
+@numba.njit(cache=True)
+def _derivatives(K: Array, T: Array, scatter: Array, acceleration: Array, weights: Array) -> tuple[float, Array, Array]:
     size = T.shape[0]
     total, gradient, hessian = 0.0, np.zeros(size), np.zeros((size, size))
     sparse = entries(T)
@@ -121,8 +126,7 @@ def derivatives(K: Array, T: Array, scatter: Array, acceleration: Array, wrench:
     dV = np.empty((size, 6, 6))
     for c in range(scatter.shape[0]):
         WdVR, WdVWB = np.zeros((size, 6, 6)), np.zeros((size, 6, T.shape[2]))
-        S, Sa = scatter[c], acceleration[c]
-        W = weight(K, Sa, wrench[c])
+        S, Sa, W = scatter[c], acceleration[c], weights[c]
         B = product(K, S)
         C = product_transposed(B, K)
         WB = product(W, B)
@@ -165,19 +169,22 @@ def derivatives(K: Array, T: Array, scatter: Array, acceleration: Array, wrench:
     return total, gradient, hessian
 
 
-@numba.njit(cache=True)
 def information(K: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array) -> tuple[Array, Array, Array]:
     """Return the parts of the sandwich (p, p): expected H, the extra score variance D, and the uncorrected H.
 
     H_pq = tr(W T_p (S - n Sigma_a) T_q^T) is the information about the true accelerations;
     D_pq = n tr(W M_p P M_q^T), P = Sigma_a - Sigma_a M^T W M Sigma_a, is what noise in the regressor adds.
     """
+    return _information(K, T, scatter, acceleration, weights_at(K, acceleration, wrench))
+
+
+@numba.njit(cache=True)
+def _information(K: Array, T: Array, scatter: Array, acceleration: Array, weights: Array) -> tuple[Array, Array, Array]:
     size, width = T.shape[0], T.shape[2]
     expected, extra, plain = np.zeros((size, size)), np.zeros((size, size)), np.zeros((size, size))
     sparse = entries(T)
     for c in range(scatter.shape[0]):
-        S, Sa, n = scatter[c], acceleration[c], scatter[c, 18, 18]
-        W = weight(K, Sa, wrench[c])
+        S, Sa, W, n = scatter[c], acceleration[c], weights[c], scatter[c, 18, 18]
         WK = product(W, K)
         true, P = S.copy(), np.zeros((width, width))
         for i in range(6):

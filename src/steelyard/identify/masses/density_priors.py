@@ -17,7 +17,7 @@ from scipy.special import softmax
 
 from steelyard.check import Array, Integers
 from steelyard.identify.cost.dense import cholesky, downhill, eigen, inner, moved, times
-from steelyard.identify.cost.linear import inverse_scaled
+from steelyard.identify.cost.linear import RANK_TOLERANCE, pseudo_inverse
 from steelyard.identify.mixture import spread_of
 
 # Log density [kg/m^3] of everyday solids: wood to brass lies within one and a half deviations.
@@ -128,7 +128,7 @@ def common_density(A: Array, b: Array, volume: Array, start: Array) -> tuple[Arr
 @numba.njit(cache=True)
 def spread_masses(volume: Array, group: Integers, y: Array, hessian: Array, masses: Array, spread: Array) -> None:
     """Write masses (P,) and their covariance (P, P) at a mode."""
-    inverse = inverse_scaled(hessian)
+    inverse = pseudo_inverse(hessian, RANK_TOLERANCE)
     for k in range(len(volume)):
         masses[k] = volume[k] * np.exp(y[group[k]])
     for k in range(len(volume)):

@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.identify.cost.dense import moved, times
-from steelyard.identify.cost.linear import inverse_scaled, solve_scaled
+from steelyard.identify.cost.linear import RANK_TOLERANCE, pseudo_inverse
 
 # The whole weighs at least this much [kg].
 LIGHTEST = 1e-6
@@ -82,7 +82,7 @@ def _free_masses(A: Array, b: Array, free: Mask) -> Array:
         pull[i] = b[place[i]]
         for j in range(n):
             chosen[i, j] = A[place[i], place[j]]
-    found = solve_scaled(chosen, pull)
+    found = times(pseudo_inverse(chosen, RANK_TOLERANCE), pull)
     for i in range(n):
         out[place[i]] = found[i]
     return out
@@ -102,7 +102,7 @@ def spread_about(A: Array, b: Array, masses: Array) -> Array:
     for k in range(P):
         bounded[k, k] += loose
         pull[k] += loose * masses[k]
-    covariance = inverse_scaled(bounded)
+    covariance = pseudo_inverse(bounded, RANK_TOLERANCE)
     held, shift, column = np.zeros(P), np.zeros(P), np.empty(P)
     mean = times(covariance, pull)
     for _ in range(SWEEPS):

@@ -145,7 +145,7 @@ class Rows:
         within = np.stack([added[r].T @ added[r] for r in rows])
         both = np.block([[own, np.swapaxes(across, 1, 2)], [across, within]])
         values_last = np.r_[:size, size + 1 : both.shape[1], size]
-        return np.asarray(both[:, values_last[:, None], values_last])
+        return np.asarray(both.take(values_last, 1).take(values_last, 2))
 
     @cached_property
     def _own(self) -> tuple[Array, Array]:
@@ -160,7 +160,7 @@ class Rows:
 
     @cached_property
     def _stretches(self) -> tuple[Integers | None, list[slice]]:
-        """The order (N,) of rows, block after block, None if they lie so, and which six-fold rows each block is then."""
+        """The order (N,) of rows, block after block, None if they lie so, and each block's place in 6 N lines then."""
         ends = 6 * np.cumsum(np.bincount(self.block))
         sorted_already = bool((np.diff(self.block) >= 0).all())
         order = None if sorted_already else np.argsort(self.block, kind="stable")

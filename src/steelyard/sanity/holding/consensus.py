@@ -80,7 +80,10 @@ def solve(H: Array, g: Array) -> Array:
                 total -= low[i, k] * low[j, k]
             low[i, j] = np.sqrt(max(total + UNSEEN, UNSEEN)) if i == j else total / low[j, j]
         x[i] = g[i] * scale[i]
-    return solved(low, x) * scale
+    x = solved(low, x)
+    for i in range(n):
+        x[i] *= scale[i]
+    return x
 
 
 @numba.njit(cache=True)
@@ -101,7 +104,8 @@ def _scan(H: Array, g: Array, c: Array, ridge: Array, masks: Mask, least: int, l
                     for j in range(p):
                         total[i, j] += H[n, i, j]
         x = solve(total, right)
-        found[k] = x
+        for i in range(p):
+            found[k, i] = x[i]
         for n in range(nodes):
             value = c[n]
             for i in range(p):
@@ -109,8 +113,13 @@ def _scan(H: Array, g: Array, c: Array, ridge: Array, masks: Mask, least: int, l
                 for j in range(p):
                     row += H[n, i, j] * x[j]
                 value += x[i] * row
-            error[n] = max(value, 0.0)
-        cost[k] = _split(np.sort(error), least, lost)[0]
+            # Sorted as they come: to compile NumPy's sort takes longer than all else here.
+            place, value = n, max(value, 0.0)
+            while place > 0 and error[place - 1] > value:
+                error[place] = error[place - 1]
+                place -= 1
+            error[place] = value
+        cost[k] = _split(error, least, lost)[0]
     return cost, found
 
 
