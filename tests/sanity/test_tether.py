@@ -91,6 +91,19 @@ def test_residuals_of_all_rows_are_without_it() -> None:
     assert not of_another_fit(found, left)
 
 
+def test_bars_hold_one_that_noise_hides() -> None:
+    """It is left in, and made the mass ten bars too large."""
+    recording = pulled(hammer.recording(0).recording, "below", 0.5)
+    wrench, poses = recording.streams
+    rng, noise = np.random.default_rng(1), {"force": 0.5, "torque": 0.025}
+    channels = {name: read + noise[name] * rng.normal(size=read.shape) for name, read in wrench.channels.items()}
+    found = sy.identify(replace(recording, streams=(replace(wrench, channels=channels), poses)))
+    assert "contact" not in found.codes()
+    assert any("pull" in note for note in found.notes)
+    assert np.abs(misses(found)).max() < 3
+    assert found.std[0] > 0.03 * found.mass
+
+
 def test_a_slack_one_changes_nothing() -> None:
     slack = sy.identify(pulled(hammer.recording(0).recording, "above", 6.0, slack=3.0))
     assert np.array_equal(slack.covariance, sound_answer().covariance)

@@ -18,7 +18,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import KNOWN_PLACE, Recording
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.load import Load, looked_at, placed
-from steelyard.pipelines.looking_back import corrections_allowed, looked_back, of_sensor_and_body, pulled
+from steelyard.pipelines.looking_back import corrections_allowed, looked_back, of_sensor_and_body, pull_allowed
 from steelyard.pipelines.options import DEFAULTS, DRIFT_ALLOWED, Options
 from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, sign_found, told, uncalibrated
 from steelyard.pipelines.told_by_rows import rows_as_given
@@ -61,7 +61,7 @@ def identify(
     estimate = estimate if rows.place is None else rows.place.widened(estimate)
     estimate = estimate if rows.maybe is None else rows.maybe.allowed(estimate)
     estimate, of_sensor = of_sensor_and_body(load, estimate, rows, recording, (*before, *late))
-    estimate = estimate.noted(*pulled(load, estimate, rows, recording, (*before, *late, *of_sensor)))
+    estimate = pull_allowed(load, estimate, rows, recording, (*before, *late, *of_sensor))
     estimate = told(estimate, Noticed(before, late, of_sensor), rows, load, parts)
     if parts is not None and shape is not None:
         estimate = looked_at(estimate, parts, shape, load.shape is not None)

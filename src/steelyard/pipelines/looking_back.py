@@ -23,7 +23,7 @@ from steelyard.sanity.fitted.gravity import levelled
 from steelyard.sanity.fitted.load_motion import examine_masses, examine_motion
 from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
 from steelyard.sanity.fitted.sensor_matrix import examine_sensor
-from steelyard.sanity.fitted.tether import Tether
+from steelyard.sanity.fitted.tether import MAYBE, Tether, examine_tether
 from steelyard.sanity.fitted.yielding import allow_filter, allow_sag, allow_softness
 
 # A sensor that is said to be tared is not where chance gives such a bias less often than this.
@@ -84,36 +84,44 @@ def corrections_allowed(load: Load, estimate: Estimate, rows: FitRows) -> Estima
     if rows.unplayed is not None:
         estimate = estimate.noted(MAYBE_PLAY)
     if rows.tether is not None and rotation is not None:
-        estimate = _allowing_tether(load, estimate, rows.tether, rotation)
+        estimate = estimate.allowing(*_moved_by_doubt(load, estimate, rows.tether, rotation))
     return estimate.allowing(*(load.of(other).parameters.vector - estimate.parameters.vector for other in others))
 
 
-def _allowing_tether(load: Load, estimate: Estimate, tether: Tether, rotation: Array) -> Estimate:
-    """Return the estimate with bars that hold how well the pull of a hose is known; rotation (N, 3, 3) turns S into W.
+def _moved_by_doubt(load: Load, estimate: Estimate, tether: Tether, rotation: Array) -> tuple[Array, ...]:
+    """Return by how much (10,) each that is not known of the pull of a hose may move the parameters of the load.
 
     What it may pull along gravity may be more than the load weighs: a small share of it tells what the whole does.
     """
     weight = estimate.mass * float(np.linalg.norm(load.log.gravity, axis=1).mean())
     share = min(1.0, SMALL * weight / tether.doubt)
     other = load.of(tether.doubted(load.log, rotation, share)).parameters.vector
-    return estimate.allowing((other - estimate.parameters.vector) / share, *tether.moved.T)
+    return ((other - estimate.parameters.vector) / share, *tether.moved.T)
 
 
-def pulled(
+def pull_allowed(
     load: Load, estimate: Estimate, rows: FitRows, recording: Recording, known: tuple[Finding, ...]
-) -> tuple[str, ...]:
-    """Return a note on a likely pull that keeps its direction in the room, where its like along gravity is a bar.
+) -> Estimate:
+    """Return the estimate with a note on what is likely to pull in the room, and bars that hold what a hose would do.
+
+    One that is not beyond doubt is left in: bars hold the answer without it, and what is not known of its pull.
 
     known  all that was found so far
     """
-    rotation = rotation_of(load.log, rows.aligned)
-    other = stands_aside("room bias", known) or any(f.left_in for f in known)
-    if other or rows.room is not None or rows.tether is not None or rotation is None or load.options.gravity != "given":
-        return ()
-    seen, size = room_fit(load.log, rotation, recording.gravity, load.bias.drift), np.linalg.norm(recording.gravity)
-    if seen is None or not seen.pulls or np.linalg.norm(seen.force) < size * estimate.std[0]:
-        return ()
-    return (seen.note(float(size)),)
+    log, rotation, gravity = load.log, rotation_of(load.log, rows.aligned), recording.gravity
+    aside = stands_aside("room bias", known) or any(f.left_in for f in known)
+    if aside or rows.room is not None or rows.tether is not None or rotation is None or load.options.gravity != "given":
+        return estimate
+    seen, size = room_fit(log, rotation, gravity, load.bias.drift), float(np.linalg.norm(gravity))
+    said = seen is not None and seen.pulls and np.linalg.norm(seen.force) >= size * estimate.std[0]
+    notes = (seen.note(size),) if seen is not None and said else ()
+    tether = None if rows.unmeasured else examine_tether(log, rows.aligned, gravity, False, load.bias.drift, MAYBE)
+    if tether is None:
+        return estimate.noted(*notes)
+    plain, bare = load.estimate(), load.of(tether.put_right(log, rows.aligned))
+    moved = _moved_by_doubt(load, plain, tether, rotation)
+    estimate = estimate.allowing(bare.parameters.vector - plain.parameters.vector, *moved)
+    return estimate.noted(*(notes or (tether.note,)))
 
 
 def not_tared(load: Load, estimate: Estimate) -> tuple[Finding, ...]:

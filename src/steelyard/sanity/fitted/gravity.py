@@ -27,6 +27,7 @@ class FittedGravity:
     gravity    (3,) [m/s^2] in W
     angle      [rad] to that given, and its standard deviation
     left       residual variance, as a share of that with gravity as given
+    slowly     the same of means over a second, which hold hardly any white noise
     tilts      (k, 3) [rad] turns in W of one standard deviation each, independent of one another: two where the log
                tells the direction, one where it tells one angle only
     """
@@ -35,6 +36,7 @@ class FittedGravity:
     angle: float
     angle_std: float
     left: float
+    slowly: float
     tilts: Array
 
     @property
@@ -80,7 +82,8 @@ def fitted_gravity(log: MotionLog, rotation: Array, gravity: Array, acceleration
     variance, own = np.linalg.eigh(fit.extra_covariance)
     tilts = (axes @ own * np.sqrt(np.maximum(variance, 0))).T
     angle = float(np.arccos(np.clip(found @ gravity / (gravity @ gravity), -1, 1)))
-    return FittedGravity(found, angle, float(np.linalg.norm(spread)), fit.beside(level), tilts)
+    slowly = rows.slowly(fit, columns @ told) / max(given.slowly(level), 1e-300)
+    return FittedGravity(found, angle, float(np.linalg.norm(spread)), fit.beside(level), slowly, tilts)
 
 
 def levelled(log: MotionLog, rotation: Array, gravity: Array, acceleration_from: str) -> MotionLog:

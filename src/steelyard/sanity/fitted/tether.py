@@ -8,6 +8,7 @@ acceleration alone tells it from mass, and how stiffly it is held says how large
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,17 +28,32 @@ from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
 from steelyard.sanity.words import axis_words, shortly
 from steelyard.spatial import cross_matrix
 
-# It is seen where its stiffness, added up over the axes, is beyond so many standard deviations by leaving out
-# stretches, and it leaves so much less of what lasts for a second: made logs without one keep 0.56 and more, but for
-# tilted ones.
-SURE, SLOWLY = 5.0, 0.5
-# ... and where no point is known yet that it pulls at, beyond so many.
-LIKELY = 3.0
+# Its point is sought from so many standard deviations on, by leaving out stretches: of its stiffness, added up over the
+# axes, or of its pull across gravity.
+FIRST = 2.0
+
+
+class Asked(NamedTuple):
+    """What a tether must show.
+
+    stiff   beyond how many standard deviations its stiffness must be, what share of what lasts a second it may leave
+    steady  the same of the pull of one whose stiffness does not show
+    better  what share it may leave of what lasts beside tilted gravity, or a bias in the room: they have fewer numbers
+    """
+
+    stiff: tuple[float, float]
+    steady: tuple[float, float]
+    better: float
+
+
+# Made logs without one keep 0.51 of what lasts and more, but for tilted ones.
+SURELY = Asked((5.0, 0.5), (5.0, 0.5), 0.8)
+# A weak one leaves nearly all that lasts beside noise. But of sound made logs none shows more than 3.2 standard
+# deviations of a stiffness that pushes nowhere, and none keeps less than 0.66 of what lasts beside a pull.
+MAYBE = Asked((4.0, 1.0), (5.0, 0.6), 0.95)
 # No axis may be pushed away by more than this share of how the stiffest is drawn back: errors of a sensor or an arm
 # that come back with the pose have either sign.
 PUSHED = 0.2
-# It leaves so much less of the squared residual than gravity along another direction, which has fewer numbers.
-BETTER = 0.8
 # [m] Nothing hangs farther from the sensor. How far it may be drawn out, where nothing else tells its pull.
 FARTHEST, DRAWN = 1.0, 1.0
 # So many times as hard as across gravity one may pull along it whose stiffness does not show: most hang from above.
@@ -97,6 +113,12 @@ class Tether:
         return replace(log, wrench=log.wrench - np.concatenate([np.cross(self.point, in_sensor), in_sensor], 1))
 
     @property
+    def note(self) -> str:
+        """Say of one that is likely only what it may do."""
+        size = float(np.hypot(np.linalg.norm(self.steady), self.doubt))
+        return f"a hose or a cable may pull at the load, by some {size:.1g} N: the bars hold what that would do"
+
+    @property
     def finding(self) -> Finding:
         """What is said of it."""
         at, pull = f"at ({shortly(1e3 * self.point)}) mm in S", shortly(0.0 - self.steady)
@@ -121,8 +143,10 @@ class Tether:
         )
 
 
-def examine_tether(log: MotionLog, aligned: Aligned, gravity: Array, turned: bool, drift: bool) -> Tether | None:
-    """Return the tether that a log shows where it is sure, and explains more than any other cause; else None.
+def examine_tether(
+    log: MotionLog, aligned: Aligned, gravity: Array, turned: bool, drift: bool, asked: Asked = SURELY
+) -> Tether | None:
+    """Return the tether that a log shows as is asked, and that explains more than any other cause; else None.
 
     aligned  of which the log holds rows     gravity  (3,) [m/s^2] in W     drift  whether the bias may grow with time
     turned   whether the sign of the wrench was chosen so that the mass is above zero
@@ -138,8 +162,8 @@ def examine_tether(log: MotionLog, aligned: Aligned, gravity: Array, turned: boo
     # What pulls along gravity is weight without inertia: a log that moves calmly enough tells it apart.
     noise = noise_share(log) if log.noise is not None and moves(log) else np.inf
     ways = np.column_stack([level, up]) if noise < CALM else level
-    found = _sought(rows, rotation[pick], position[pick] - middle, ways)
-    if found is None or not _best(found, log, rotation, gravity, source, drift):
+    found = _sought(rows, rotation[pick], position[pick] - middle, ways, asked)
+    if found is None or not _best(found, log, rotation, gravity, source, drift, asked.better):
         return None
     if np.trace(found.stiffness) < 0:
         if turned:
@@ -159,9 +183,10 @@ def examine_tether(log: MotionLog, aligned: Aligned, gravity: Array, turned: boo
 class _Sought:
     """What fits best: steady force (3,), stiffness (3, 3) and point (3,) as of a `Tether`.
 
-    fit    the fit of those combinations of its numbers that are told
-    along  (k,) what they make of the force along gravity; None where no acceleration tells that
-    left   squared residual beside that without a tether
+    fit     the fit of those combinations of its numbers that are told
+    along   (k,) what they make of the force along gravity; None where no acceleration tells that
+    left    squared residual beside that without a tether
+    slowly  the same of means over a second
     """
 
     steady: Array
@@ -170,6 +195,7 @@ class _Sought:
     fit: FullFit
     along: Array | None
     left: float
+    slowly: float
 
     def upward(self, doubted: float) -> tuple[float, Array]:
         """Return the standard deviation [N] of the force along gravity, infinite where no acceleration tells it, and
@@ -189,36 +215,44 @@ class _Sought:
         return std, axes * np.sqrt(np.maximum(values, 0.0))
 
 
-def _best(found: _Sought, log: MotionLog, rotation: Array, gravity: Array, source: str, drift: bool) -> bool:
-    """Tell whether a tether leaves less than a turned sensor, unlike gains, another point, a bias that keeps its
-    direction in the room, or tilted gravity."""
-    others = sensor_matrix(log, drift), misplaced(log, drift), room_fit(log, rotation, gravity, drift)
-    tilted = fitted_gravity(log, rotation, gravity, source)
+def _best(
+    found: _Sought, log: MotionLog, rotation: Array, gravity: Array, source: str, drift: bool, better: float
+) -> bool:
+    """Tell whether a tether leaves less than a turned sensor, unlike gains or another point.
+
+    Tilted gravity, and a bias that keeps its direction in the room, have fewer numbers: of what these leave of what
+    lasts it must leave a share below `better`.
+    """
+    room, tilted = room_fit(log, rotation, gravity, drift), fitted_gravity(log, rotation, gravity, source)
+    others = sensor_matrix(log, drift), misplaced(log, drift), room
     best = all(other is None or found.left < other.left for other in others)
-    return best and (tilted is None or found.left < BETTER * tilted.left)
+    return best and all(other is None or found.slowly < better * other.slowly for other in (room, tilted))
 
 
-def _sought(rows: Rows, R: Array, p: Array, ways: Array) -> _Sought | None:
-    """Return the tether that fits best; None where none is sure.
+def _sought(rows: Rows, R: Array, p: Array, ways: Array, asked: Asked) -> _Sought | None:
+    """Return the tether that fits best; None where none shows as is asked.
 
     Where the sensor turns in place, its point shows by a steady pull first; how stiff it is may not show there.
 
     R, p  (N, 3, 3) S to W and (N, 3) [m] from the middle at the rows
     ways  (3, k) axes in W along which a steady force is told
     """
-    stiff = _settled(rows, R, p, ways, _STIFFNESSES, np.zeros(3))
+    stiff = _settled(rows, R, p, ways, _STIFFNESSES, np.zeros(3), asked)
     if stiff is not None:
         return stiff
-    steady = _settled(rows, R, p, ways, _STIFFNESSES[:0], np.zeros(3))
-    return None if steady is None else _settled(rows, R, p, ways, _STIFFNESSES, steady.point) or steady
+    # Stiffness that does not show would pass for a pull along gravity in what moves: of a weak one that is not told.
+    told = ways if asked is SURELY else ways[:, :2]
+    steady = _settled(rows, R, p, told, _STIFFNESSES[:0], np.zeros(3), asked)
+    return None if steady is None else _settled(rows, R, p, ways, _STIFFNESSES, steady.point, asked) or steady
 
 
-def _settled(rows: Rows, R: Array, p: Array, ways: Array, kinds: Array, point: Array) -> _Sought | None:
-    """Return the tether that fits best from a first point (3,) [m] on; None where it is not sure.
+def _settled(rows: Rows, R: Array, p: Array, ways: Array, kinds: Array, point: Array, asked: Asked) -> _Sought | None:
+    """Return the tether that fits best from a first point (3,) [m] on; None where it does not show as is asked.
 
     kinds  (j, 3, 3) symmetric matrices that its stiffness is made of; without any it pulls steadily across gravity
     """
     once, count = rows.solve(), ways.shape[1]
+    times, most = asked.stiff if len(kinds) else asked.steady
     numbers, slow = np.concatenate([np.zeros(count + len(kinds)), point]), rows.slowly(once)
     for turn in range(ROUNDS):
         columns, offset = _linear(numbers, R, p, ways, kinds)
@@ -232,7 +266,8 @@ def _settled(rows: Rows, R: Array, p: Array, ways: Array, kinds: Array, point: A
         before, numbers = numbers, told @ fit.extra
         counts = _counts(numbers, kinds)
         spread = float(np.sqrt(counts @ told @ fit.extra_covariance @ told.T @ counts))
-        if abs(counts @ numbers) < (SURE if turn else LIKELY) * spread:
+        shown = abs(counts @ numbers) / max(spread, 1e-300)
+        if shown < FIRST:
             return None
         step = numbers[-3:] - before[-3:]
         numbers[-3:] = before[-3:] + np.clip(step, -STEP, STEP)
@@ -241,10 +276,11 @@ def _settled(rows: Rows, R: Array, p: Array, ways: Array, kinds: Array, point: A
     steady, stiffness, point = _apart(numbers, ways, kinds)
     values = np.linalg.eigvalsh(stiffness * np.sign(np.trace(stiffness)))
     pushes, far = values[0] < -PUSHED * values[2], np.linalg.norm(point) > FARTHEST
-    if pushes or far or shifted.slowly(fit, columns) > SLOWLY * slow:
+    slowly = shifted.slowly(fit, columns) / slow
+    if shown < times or pushes or far or slowly > most:
         return None
     along = told[2] if count == 3 and told.shape == (len(numbers), len(numbers)) else None
-    return _Sought(steady, stiffness, point, fit, along, fit.beside(once))
+    return _Sought(steady, stiffness, point, fit, along, fit.beside(once), slowly)
 
 
 def _counts(numbers: Array, kinds: Array) -> Array:
