@@ -46,16 +46,35 @@ _FIRST = slice(1, 4)  # where phi and the rows have the first moment
 
 @dataclass(frozen=True, eq=False)
 class LoadChange:
-    """At `time` [s] the mass went from `before` to `after` [kg], or the body slipped; residual (F, 6) with both bodies.
+    """At `time` [s] the mass went from `before` to `after` [kg], or the body slipped.
 
-    slip  [m] how far the centre of mass moved at the same mass, 0 where the mass changed
+    residual, load  (F, 6) what both bodies and the bias leave of the wrench, and what the bodies make of it
+    slip            [m] how far the centre of mass moved at the same mass, 0 where the mass changed
     """
 
     time: float
     before: float
     after: float
     residual: Array
+    load: Array
     slip: float = 0.0
+
+    @property
+    def loaded_before(self) -> bool | None:
+        """Whether the load was held before, where nothing is held on one side of the change; None where both hold."""
+        if min(self.before, self.after) > SHARE * max(self.before, self.after):
+            return None
+        return self.before > self.after
+
+    @property
+    def words(self) -> str:
+        """What happened, in words."""
+        if self.slip:
+            return slip_words(self.slip)
+        if self.loaded_before is None:
+            return f"the load changed from {self.before:.3g} to {self.after:.3g} kg"
+        done = "put down or lost" if self.loaded_before else "picked up"
+        return f"the load of {max(self.before, self.after):.3g} kg was {done}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +104,12 @@ def _anew(H: Array, g: Array, late: Array, late_g: Array, columns: slice) -> tup
     return out, np.append(g, late_g[columns])
 
 
-def longer_side(time: Array, at: float, what: str, slipped: bool) -> tuple[Mask, Finding]:
-    """Return the rows (N,) of the longer side of a change at a time [s], away from hands, and what is to be said."""
-    early = at - time[0] >= time[-1] - at
+def kept_side(time: Array, at: float, what: str, slipped: bool, early: bool | None = None) -> tuple[Mask, Finding]:
+    """Return the rows (N,) of one side of a change at a time [s], away from hands, and what is to be said.
+
+    early  whether the side before is kept; None = the longer one
+    """
+    early = at - time[0] >= time[-1] - at if early is None else early
     side = time < at - HANDS / 2 if early else time > at + HANDS / 2
     text = (
         f"At {at:.1f} s {what}; only the time {'before' if early else 'after'} it was used "
@@ -121,17 +143,20 @@ def find_change(slices: Slices, tolerance: Array, memory: float) -> LoadChange |
     covariance = memory * np.linalg.inv(normal)[first : first + 4, first : first + 4]
     slip = _slip(before, change, np.asarray(covariance, dtype=np.float64))
     real = slip > 0 or abs(change[0]) > max(SHARE * before[0], DEVIATIONS * float(np.sqrt(covariance[0, 0])))
-    possible = before[0] > 0 and before[0] + change[0] > 0
+    masses = before[0], before[0] + change[0]
+    # Who holds nothing may weigh a little less than that.
+    possible = max(masses) > 0 and min(masses) > -SHARE * max(masses)
     possible = possible and np.linalg.norm(change[1:4]) < LONGEST_LEVER * (before[0] if slip else abs(change[0]))
     if len(run.ridge) > 10:
         jump = run.cost(j, slice(10, 16)) - run.cost(j, slice(0, 10))
         possible = possible and jump / memory > BEYOND_BIAS
     if not (real and possible):
         return None
-    residual = slices.y - slices.A @ x[: len(run.ridge)]
-    residual[j:] -= slices.A[j:, :, :10] @ change
+    load = slices.A[:, :, :10] @ before
+    load[j:] += slices.A[j:, :, :10] @ change
+    residual = slices.y - load - slices.A[:, :, 10:] @ x[10 : len(run.ridge)]
     time = float(slices.time[j - 1] + slices.time[j]) / 2
-    return LoadChange(time, float(before[0]), float(before[0] + change[0]), residual, slip)
+    return LoadChange(time, float(before[0]), float(before[0] + change[0]), residual, load, slip)
 
 
 def _slip(before: Array, change: Array, covariance: Array) -> float:
@@ -174,7 +199,7 @@ class Slip:
     def longer_side(self, log: MotionLog) -> tuple[Mask, Finding]:
         """Return the rows (N,) of the longer part of the log, and what is to be said."""
         time = np.zeros(0) if log.time is None else log.time
-        return longer_side(time, self.time, slip_words(float(np.linalg.norm(self.moved))), slipped=True)
+        return kept_side(time, self.time, slip_words(float(np.linalg.norm(self.moved))), slipped=True)
 
 
 def small_slip(log: MotionLog, rotation: Array | None = None, gravity: Array | None = None) -> Slip | None:
