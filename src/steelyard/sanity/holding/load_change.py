@@ -41,7 +41,10 @@ SLIP_LEFT, BESIDE_JUMP, BESIDE_TILT = 0.9, 1.5, 2.0
 JUMP_TOO = 0.1
 # It must be this sure by leaving out stretches, no less, and no more: who loses an object has not slipped [m].
 SLIP_SURE, SMALLEST, LARGEST = 12.0, 1e-3, 0.1
-_FIRST = slice(1, 4)  # where phi and the rows have the first moment
+# Not a slip but a change of load: a mass that changes as well, by this share or more, leaves less than this of what a
+# slip leaves.
+LEAST_CHANGE, MASS_LEFT = 0.01, 0.9
+_FIRST, _MASS_TOO = slice(1, 4), slice(0, 4)  # where phi and the rows have the first moment, and the mass before it
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,7 @@ class LoadChange:
         if self.slip:
             return slip_words(self.slip)
         if self.loaded_before is None:
-            return f"the load changed from {self.before:.3g} to {self.after:.3g} kg"
+            return change_words(self.before, self.after)
         done = "put down or lost" if self.loaded_before else "picked up"
         return f"the load of {max(self.before, self.after):.3g} kg was {done}"
 
@@ -117,6 +120,11 @@ def kept_side(time: Array, at: float, what: str, slipped: bool, early: bool | No
     )
     finding = Finding.of("load-changed", text)
     return side, replace(finding, remedy=SLIPPED) if slipped else finding
+
+
+def change_words(before: float, after: float) -> str:
+    """Say that the mass changed [kg]."""
+    return f"the load changed from {before:.3g} to {after:.3g} kg"
 
 
 def slip_words(moved: float) -> str:
@@ -190,16 +198,21 @@ def first_after(time: Array, cost: Callable[[int], float], ends: int = 0) -> int
 
 @dataclass(frozen=True, eq=False)
 class Slip:
-    """At `time` [s] the centre of mass moved by `moved` (3,) [m], `std` (3,) [m] by leaving out stretches."""
+    """At `time` [s] the centre of mass moved by `moved` (3,) [m], `std` (3,) [m] by leaving out stretches.
+
+    masses  [kg] before and after, where it is the mass that changed: its first moment changes with it
+    """
 
     time: float
     moved: Array
     std: Array
+    masses: tuple[float, float] | None = None
 
     def longer_side(self, log: MotionLog) -> tuple[Mask, Finding]:
         """Return the rows (N,) of the longer part of the log, and what is to be said."""
         time = np.zeros(0) if log.time is None else log.time
-        return kept_side(time, self.time, slip_words(float(np.linalg.norm(self.moved))), slipped=True)
+        what = change_words(*self.masses) if self.masses else slip_words(float(np.linalg.norm(self.moved)))
+        return kept_side(time, self.time, what, slipped=self.masses is None)
 
 
 def small_slip(log: MotionLog, rotation: Array | None = None, gravity: Array | None = None) -> Slip | None:
@@ -230,7 +243,20 @@ def small_slip(log: MotionLog, rotation: Array | None = None, gravity: Array | N
             return None
     moved, std = found.extra / found.phi[0], found.extra_std / found.phi[0]
     sure = bool((np.abs(moved) > SLIP_SURE * std).any())
-    return Slip(when, moved, std) if sure and SMALLEST < np.linalg.norm(moved) < LARGEST else None
+    if not sure or not SMALLEST < np.linalg.norm(moved) < LARGEST:
+        return None
+    return Slip(when, moved, std, _masses(rows, late, found.left))
+
+
+def _masses(rows: Rows, late: Mask, left: float) -> tuple[float, float] | None:
+    """Return the mass [kg] before and after, where one that changes leaves far less than the `left` of a slip.
+
+    late  (N, 1, 1) the rows after the change
+    """
+    found = rows.solve(rows.columns[:, :, _MASS_TOO] * late, jackknife=True)
+    mass, change = float(found.phi[0]), float(found.extra[0])
+    sure = abs(change) > max(LEAST_CHANGE * mass, SLIP_SURE * float(found.extra_std[0]))
+    return (mass, mass + change) if sure and found.left < MASS_LEFT * left else None
 
 
 def _best(rows: Rows) -> float | None:
