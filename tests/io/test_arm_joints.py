@@ -194,6 +194,18 @@ def test_wrong_descriptions(tmp_path: Path, old: str, new: str, said: str) -> No
     assert message(path) == said.replace("LARGEST", f"{np.abs(largest).max():.4g}")
 
 
+def test_one_joint_in_degrees_among_radians_is_named(tmp_path: Path) -> None:
+    path = write(tmp_path, TOML.replace('unit = "deg" }', 'unit = "rad" }', 1))
+    header, *rows = (tmp_path / "log.csv").read_text().splitlines()
+    table = np.array([row.split(",") for row in rows], float)
+    joints = [k for k, name in enumerate(header.split(",")) if name in JOINTS and name != "elbow"]
+    table[:, joints] = np.radians(table[:, joints])
+    lines = [header, *(",".join(f"{x:.9f}" for x in row) for row in table)]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    said = 'set unit = "deg". Only elbow does: where the others are in rad, convert elbow in the file.'
+    assert message(path).endswith(said)
+
+
 def test_radians_declared_as_degrees(tmp_path: Path) -> None:
     path = write(tmp_path)
     header, *rows = (tmp_path / "log.csv").read_text().splitlines()

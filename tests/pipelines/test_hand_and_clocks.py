@@ -85,6 +85,20 @@ def test_where_too_little_is_left_for_clocks_all_rows_tell_them(monkeypatch: pyt
     assert abs(found.mass - BODY.mass) < 3 * found.std[0]
 
 
+@pytest.mark.parametrize(("seed", "start", "end"), [(0, 0.0, 7.0), (0, 5.0, 99.0), (1, 5.0, 99.0)])
+def test_time_without_a_load_tells_no_clocks(seed: int, start: float, end: float) -> None:
+    sound = made(seed)
+    wrench = sound.streams[0]
+    empty = ((wrench.time - wrench.time[0] >= start) & (wrench.time - wrench.time[0] < end))[:, None]
+    load = Swing(seed, travel=0.08).log(wrench.time).wrench * empty
+    felt = {"force": wrench.channels["force"] - load[:, 3:], "torque": wrench.channels["torque"] - load[:, :3]}
+    found = identify(replace(sound, streams=(replace(wrench, channels=felt), *sound.streams[1:])))
+    assert "load-changed" in found.codes()
+    assert not causes(found)
+    assert abs(found.mass - BODY.mass) < 4 * found.std[0]
+    assert found.std[0] < 0.01 * BODY.mass
+
+
 THRICE = ((1.0, 1.6), (2.7, 3.3), (4.5, 5.2))
 
 

@@ -200,6 +200,24 @@ def test_a_load_change_is_named_with_its_time(motion: str, name: str, level: str
     assert NoiseAware().identify(log.rows(mask)).parameters.mass == pytest.approx(true, rel=0.04)
 
 
+@pytest.mark.parametrize("motion", ["stop_go", "dyn_slow"])
+@pytest.mark.parametrize(("at", "lost"), [(6.5, True), (3.5, True), (6.5, False), (3.5, False)])
+def test_of_a_load_picked_up_or_put_down_the_loaded_side_is_kept(motion: str, at: float, lost: bool) -> None:
+    body = scenarios.body("hammer").parameters().vector
+    for seed in range(4):
+        log = made("hammer", motion, "low", seed)
+        empty = (log.time >= at) == lost
+        # The sensor leaks 1 % of the other axes into each: that of nothing is nothing.
+        leaks = np.kron(np.eye(2), 0.01 * (np.roll(np.eye(3), 1, 0) - np.roll(np.eye(3), 2, 0)))
+        more = log.predicted(body) @ leaks - empty[:, None] * (log.predicted(body) @ (np.eye(6) + leaks))
+        mask, findings = untouched(replace(log, wrench=log.wrench + more), True)
+        assert [f.code for f in findings] == ["load-changed"]
+        said = f"the load of {body[0]:.2f}"[:-1], "was put down or lost" if lost else "was picked up"
+        assert all(words in findings[0].message for words in said)
+        assert not mask[empty].any()
+        assert mask.mean() > 0.8 * (1 - empty.mean())
+
+
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("spectrum", ["white", "2hz"])
 @pytest.mark.parametrize("level", ["none", "low", "moderate", "high"])

@@ -58,7 +58,8 @@ def posed(spec: StreamSpec, stream: Stream, arm: SerialArm) -> Stream:
     sliding = np.array([joint.kind == "prismatic" for joint in arm.moving])
     positions = stream.channels["joint_position"] / np.where(sliding, ANGLE[quantity.unit], 1.0)
     good: Mask = np.asarray(np.isfinite(positions).all(1))
-    _require_likely(quantity, positions[good][:, ~sliding])
+    turning = [joint.name for joint in arm.moving if joint.kind != "prismatic"]
+    _require_likely(quantity, positions[good][:, ~sliding], turning)
     kept = {name: values for name, values in stream.channels.items() if name != "joint_position"}
     return replace(stream, channels=kept | pose_channels(arm.pose(positions[good]), good))
 
@@ -104,12 +105,17 @@ def _places(joint: str, labels: Sequence[str]) -> list[int]:
     return exact or [k for k, label in enumerate(labels) if joint in label]
 
 
-def _require_likely(spec: QuantitySpec, angles: Array) -> None:
-    largest = float(np.abs(angles).max(initial=0.0))
-    if largest > TURNS:
+def _require_likely(spec: QuantitySpec, angles: Array, joints: Sequence[str]) -> None:
+    """Raise BadValue where angles (N, n) [rad] of the turning joints look like another unit."""
+    each = np.abs(angles).max(0, initial=0.0)
+    largest, beyond = float(each.max(initial=0.0)), each > TURNS
+    if beyond.any():
+        few = ", ".join(joint for joint, out in zip(joints, beyond, strict=True) if out)
+        do = "does" if beyond.sum() == 1 else "do"
+        rest = f" Only {few} {do}: where the others are in rad, convert {few} in the file."
         raise BadValue(
             f"{spec.where}: joints turn by up to {largest:.4g} rad, more than two turns. They are probably in degrees: "
-            'set unit = "deg".'
+            f'set unit = "deg".{"" if beyond.all() else rest}'
         )
     if spec.unit == "deg" and len(angles) and angles.shape[1] >= _ARM and largest <= np.radians(2 * np.pi):
         raise BadValue(

@@ -178,8 +178,7 @@ def _tolerance(slices: Slices, predicted: Array, rate: Array, residual: Array, k
     Its parts: the spread of the kept residuals, a share of the wrench, and what grows with the rate of the wrench, as
     an unsteady delay does, learned from the kept residuals too.
     """
-    size, speed, miss = ((v.reshape(-1, 2, 3) ** 2).sum(2) for v in (predicted, rate, residual))
-    size[:, 0] = np.maximum(size[:, 0], LEVER**2 * size[:, 1])
+    speed, miss = ((v.reshape(-1, 2, 3) ** 2).sum(2) for v in (rate, residual))
     weight, fast, miss = slices.weight[kept, None], speed[kept], miss[kept] / 3
     slow = fast <= np.median(fast, axis=0)
     steady = (weight * slow * miss).sum(0) / (weight * slow).sum(0)
@@ -188,7 +187,15 @@ def _tolerance(slices: Slices, predicted: Array, rate: Array, residual: Array, k
     spread = (weight * (miss - growth * fast)).sum(0) / weight.sum()
     count = kept.sum()
     spread = np.maximum(spread, steady) * count / max(count - slices.A.shape[2] / 6, 0.3 * count)
-    return np.asarray(np.repeat(np.sqrt(spread + growth * speed + SHARE**2 * size), 3, axis=1) + SMALLEST)
+    beside = np.repeat(np.sqrt(spread + growth * speed), 3, axis=1)
+    return np.asarray(np.hypot(beside, share_of(predicted)) + SMALLEST)
+
+
+def share_of(predicted: Array) -> Array:
+    """Return the errors (F, 6) that the model itself may have of a predicted wrench (F, 6), equal for all axes."""
+    size = (predicted.reshape(-1, 2, 3) ** 2).sum(2)
+    size[:, 0] = np.maximum(size[:, 0], LEVER**2 * size[:, 1])
+    return np.asarray(np.repeat(SHARE * np.sqrt(size), 3, axis=1))
 
 
 def _grid(slices: Slices) -> tuple[Integers, Mask]:

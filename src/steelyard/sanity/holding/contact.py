@@ -23,11 +23,11 @@ from steelyard.sanity.holding.consensus import LEVER, Consensus, Slices
 from steelyard.sanity.holding.load_change import (
     HANDS,
     LONGEST_LEVER,
+    SHARE,
     SHORTEST,
     LoadChange,
     find_change,
-    longer_side,
-    slip_words,
+    kept_side,
 )
 
 # Slices last this long [s] or hold this many rows; a log of fewer slices is not judged.
@@ -89,10 +89,17 @@ def untouched(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
 def agreeing(log: MotionLog, with_bias: bool) -> Mask:
     """Return the rows (N,), in order of time, that one body explains best, be the others touched or not.
 
-    Unlike `untouched` it asks nothing of the rest: clocks that are late may be what spoils it.
+    Unlike `untouched` it asks nothing of the rest: clocks that are late may be what spoils it. Time in which nothing is
+    held fits any clock: then it is the rest.
     """
     sliced = _slices(log, with_bias)
-    return np.ones(len(log), np.bool_) if sliced is None else consensus.largest(sliced[0]).kept[sliced[1]]
+    if sliced is None:
+        return np.ones(len(log), np.bool_)
+    slices, row = sliced
+    found = consensus.largest(slices)
+    rest = consensus.fit(slices, ~found.kept, found.tolerance)
+    empty = abs(found.x[0]) < SHARE * rest[0] and (~found.kept).mean() > LEAST_LEFT
+    return np.asarray(found.kept != empty)[row]
 
 
 def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...]]:
@@ -122,10 +129,8 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
 
 
 def _after_change(log: MotionLog, with_bias: bool, change: LoadChange) -> tuple[Mask, tuple[Finding, ...]]:
-    """Return the longer side of a load change, less the time of the hands, searched for contact in its turn."""
-    what = f"the load changed from {change.before:.3g} to {change.after:.3g} kg"
-    what = slip_words(change.slip) if change.slip else what
-    side, finding = longer_side(np.asarray(log.time), change.time, what, change.slip > 0)
+    """Return the longer or only loaded side of a change, less the time of hands, searched for contact in its turn."""
+    side, finding = kept_side(np.asarray(log.time), change.time, change.words, change.slip > 0, change.loaded_before)
     kept, more = untouched(log.rows(side), with_bias)
     mask = side.copy()
     mask[side] = kept
@@ -224,7 +229,9 @@ def _explained(slices: Slices, found: Consensus, touches: Sequence[Touch], memor
     change = find_change(slices, found.tolerance, memory)
     if change is None:
         return None
-    square = ((change.residual / found.tolerance) ** 2).mean(1)
+    # Of a heavier body than the one that was kept, errors of the model are larger, too.
+    tolerance = np.maximum(found.tolerance, consensus.share_of(change.load))
+    square = ((change.residual / tolerance) ** 2).mean(1)
     away = np.abs(slices.time - change.time) > HANDS
     parts = [square[t.first : t.last][away[t.first : t.last]] for t in touches]
     quiet = all(part.mean() < SAME for part in parts if len(part)) and square[found.kept & away].mean() < SAME

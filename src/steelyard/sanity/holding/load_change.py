@@ -41,21 +41,43 @@ SLIP_LEFT, BESIDE_JUMP, BESIDE_TILT = 0.9, 1.5, 2.0
 JUMP_TOO = 0.1
 # It must be this sure by leaving out stretches, no less, and no more: who loses an object has not slipped [m].
 SLIP_SURE, SMALLEST, LARGEST = 12.0, 1e-3, 0.1
-_FIRST = slice(1, 4)  # where phi and the rows have the first moment
+# Not a slip but a change of load: a mass that changes as well, by this share or more, leaves less than this of what a
+# slip leaves.
+LEAST_CHANGE, MASS_LEFT = 0.01, 0.9
+_FIRST, _MASS_TOO = slice(1, 4), slice(0, 4)  # where phi and the rows have the first moment, and the mass before it
 
 
 @dataclass(frozen=True, eq=False)
 class LoadChange:
-    """At `time` [s] the mass went from `before` to `after` [kg], or the body slipped; residual (F, 6) with both bodies.
+    """At `time` [s] the mass went from `before` to `after` [kg], or the body slipped.
 
-    slip  [m] how far the centre of mass moved at the same mass, 0 where the mass changed
+    residual, load  (F, 6) what both bodies and the bias leave of the wrench, and what the bodies make of it
+    slip            [m] how far the centre of mass moved at the same mass, 0 where the mass changed
     """
 
     time: float
     before: float
     after: float
     residual: Array
+    load: Array
     slip: float = 0.0
+
+    @property
+    def loaded_before(self) -> bool | None:
+        """Whether the load was held before, where nothing is held on one side of the change; None where both hold."""
+        if min(self.before, self.after) > SHARE * max(self.before, self.after):
+            return None
+        return self.before > self.after
+
+    @property
+    def words(self) -> str:
+        """What happened, in words."""
+        if self.slip:
+            return slip_words(self.slip)
+        if self.loaded_before is None:
+            return change_words(self.before, self.after)
+        done = "put down or lost" if self.loaded_before else "picked up"
+        return f"the load of {max(self.before, self.after):.3g} kg was {done}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +107,12 @@ def _anew(H: Array, g: Array, late: Array, late_g: Array, columns: slice) -> tup
     return out, np.append(g, late_g[columns])
 
 
-def longer_side(time: Array, at: float, what: str, slipped: bool) -> tuple[Mask, Finding]:
-    """Return the rows (N,) of the longer side of a change at a time [s], away from hands, and what is to be said."""
-    early = at - time[0] >= time[-1] - at
+def kept_side(time: Array, at: float, what: str, slipped: bool, early: bool | None = None) -> tuple[Mask, Finding]:
+    """Return the rows (N,) of one side of a change at a time [s], away from hands, and what is to be said.
+
+    early  whether the side before is kept; None = the longer one
+    """
+    early = at - time[0] >= time[-1] - at if early is None else early
     side = time < at - HANDS / 2 if early else time > at + HANDS / 2
     text = (
         f"At {at:.1f} s {what}; only the time {'before' if early else 'after'} it was used "
@@ -95,6 +120,11 @@ def longer_side(time: Array, at: float, what: str, slipped: bool) -> tuple[Mask,
     )
     finding = Finding.of("load-changed", text)
     return side, replace(finding, remedy=SLIPPED) if slipped else finding
+
+
+def change_words(before: float, after: float) -> str:
+    """Say that the mass changed [kg]."""
+    return f"the load changed from {before:.3g} to {after:.3g} kg"
 
 
 def slip_words(moved: float) -> str:
@@ -121,17 +151,20 @@ def find_change(slices: Slices, tolerance: Array, memory: float) -> LoadChange |
     covariance = memory * np.linalg.inv(normal)[first : first + 4, first : first + 4]
     slip = _slip(before, change, np.asarray(covariance, dtype=np.float64))
     real = slip > 0 or abs(change[0]) > max(SHARE * before[0], DEVIATIONS * float(np.sqrt(covariance[0, 0])))
-    possible = before[0] > 0 and before[0] + change[0] > 0
+    masses = before[0], before[0] + change[0]
+    # Who holds nothing may weigh a little less than that.
+    possible = max(masses) > 0 and min(masses) > -SHARE * max(masses)
     possible = possible and np.linalg.norm(change[1:4]) < LONGEST_LEVER * (before[0] if slip else abs(change[0]))
     if len(run.ridge) > 10:
         jump = run.cost(j, slice(10, 16)) - run.cost(j, slice(0, 10))
         possible = possible and jump / memory > BEYOND_BIAS
     if not (real and possible):
         return None
-    residual = slices.y - slices.A @ x[: len(run.ridge)]
-    residual[j:] -= slices.A[j:, :, :10] @ change
+    load = slices.A[:, :, :10] @ before
+    load[j:] += slices.A[j:, :, :10] @ change
+    residual = slices.y - load - slices.A[:, :, 10:] @ x[10 : len(run.ridge)]
     time = float(slices.time[j - 1] + slices.time[j]) / 2
-    return LoadChange(time, float(before[0]), float(before[0] + change[0]), residual, slip)
+    return LoadChange(time, float(before[0]), float(before[0] + change[0]), residual, load, slip)
 
 
 def _slip(before: Array, change: Array, covariance: Array) -> float:
@@ -165,16 +198,21 @@ def first_after(time: Array, cost: Callable[[int], float], ends: int = 0) -> int
 
 @dataclass(frozen=True, eq=False)
 class Slip:
-    """At `time` [s] the centre of mass moved by `moved` (3,) [m], `std` (3,) [m] by leaving out stretches."""
+    """At `time` [s] the centre of mass moved by `moved` (3,) [m], `std` (3,) [m] by leaving out stretches.
+
+    masses  [kg] before and after, where it is the mass that changed: its first moment changes with it
+    """
 
     time: float
     moved: Array
     std: Array
+    masses: tuple[float, float] | None = None
 
     def longer_side(self, log: MotionLog) -> tuple[Mask, Finding]:
         """Return the rows (N,) of the longer part of the log, and what is to be said."""
         time = np.zeros(0) if log.time is None else log.time
-        return longer_side(time, self.time, slip_words(float(np.linalg.norm(self.moved))), slipped=True)
+        what = change_words(*self.masses) if self.masses else slip_words(float(np.linalg.norm(self.moved)))
+        return kept_side(time, self.time, what, slipped=self.masses is None)
 
 
 def small_slip(log: MotionLog, rotation: Array | None = None, gravity: Array | None = None) -> Slip | None:
@@ -205,7 +243,20 @@ def small_slip(log: MotionLog, rotation: Array | None = None, gravity: Array | N
             return None
     moved, std = found.extra / found.phi[0], found.extra_std / found.phi[0]
     sure = bool((np.abs(moved) > SLIP_SURE * std).any())
-    return Slip(when, moved, std) if sure and SMALLEST < np.linalg.norm(moved) < LARGEST else None
+    if not sure or not SMALLEST < np.linalg.norm(moved) < LARGEST:
+        return None
+    return Slip(when, moved, std, _masses(rows, late, found.left))
+
+
+def _masses(rows: Rows, late: Mask, left: float) -> tuple[float, float] | None:
+    """Return the mass [kg] before and after, where one that changes leaves far less than the `left` of a slip.
+
+    late  (N, 1, 1) the rows after the change
+    """
+    found = rows.solve(rows.columns[:, :, _MASS_TOO] * late, jackknife=True)
+    mass, change = float(found.phi[0]), float(found.extra[0])
+    sure = abs(change) > max(LEAST_CHANGE * mass, SLIP_SURE * float(found.extra_std[0]))
+    return (mass, mass + change) if sure and found.left < MASS_LEFT * left else None
 
 
 def _best(rows: Rows) -> float | None:
