@@ -46,8 +46,11 @@ def rows(recording: Recording, which: np.ndarray, restamped: bool = False) -> Re
     return Recording((cut,), recording.gravity, noise=recording.noise)
 
 
-def swaying(seed: int, amplitude: float = 1.0, noise: float = 1.0) -> Recording:
-    """Return 40 s of the hammer in slow motion without a stop: turns of about `amplitude` [rad] in 10 to 30 s."""
+def swaying(seed: int, amplitude: float = 1.0, noise: float = 1.0, down: int = 2) -> Recording:
+    """Return 40 s of the hammer in slow motion without a stop: turns of about `amplitude` [rad] in 10 to 30 s.
+
+    down  the axis of W that gravity is against: the hammer's head is along the second of S
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(0, 40, 1 / 125)
 
@@ -62,9 +65,9 @@ def swaying(seed: int, amplitude: float = 1.0, noise: float = 1.0) -> Recording:
 
     turning = np.swapaxes(R, 1, 2) @ change(R)
     omega = 0.5 * np.stack([turning[:, i, j] - turning[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], 1)
-    gravity = np.array([0, 0, -9.81])
-    down, moved = np.einsum("nji,j->ni", R, gravity), np.einsum("nji,nj->ni", R, change(change(position)))
-    wrench = MotionLog(np.zeros((len(time), 6)), down, moved, omega, change(omega)).predicted(BODY.vector)
+    gravity = -9.81 * np.eye(3)[down]
+    pull, moved = np.einsum("nji,j->ni", R, gravity), np.einsum("nji,nj->ni", R, change(change(position)))
+    wrench = MotionLog(np.zeros((len(time), 6)), pull, moved, omega, change(omega)).predicted(BODY.vector)
     wrench = wrench + noise * rng.normal(size=wrench.shape) * np.repeat([TORQUE, FORCE], 3) + 0.1
     position = position + 2e-5 * rng.normal(size=position.shape)
     channels = {"rotation": R, "position": position, "force": wrench[:, 3:], "torque": wrench[:, :3]}

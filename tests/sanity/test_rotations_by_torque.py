@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sanity.held_poses import recorded
+from sanity.held_poses import recorded, swaying
 from sanity.traps import edited, reread
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.recording import Recording
@@ -50,6 +50,36 @@ def test_misread_rotations_are_put_right(made: Recording, right: Estimate, words
     assert words in found.findings[0].message
     assert "of the torque variance" in found.findings[0].message
     np.testing.assert_allclose(found.parameters.vector[:4], right.parameters.vector[:4], rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("whole", [False, True])
+def test_turned_round_in_slow_motion_beside_much_noise(seed: int, whole: bool) -> None:
+    """Rotations alone or whole poses: the torques fit as well, since no acceleration shows beside the noise."""
+    made = in_base(swaying(seed, noise=15.0), "force", "torque")
+    right = made.streams[0].channels["rotation"]
+    back = np.swapaxes(right, 1, 2)
+    wrong = edited(made, rotation=lambda _: back)
+    if whole:
+        wrong = edited(wrong, position=lambda p: -np.einsum("nij,nj->ni", back, p))
+    read, (found,) = examine(wrong)
+    assert found.code == "gravity-frame"
+    assert found.message.endswith("The answer assumes this.")
+    np.testing.assert_allclose(read.streams[0].channels["rotation"], right, atol=1e-9)
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 0.8])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_load_that_stands_upright_tells_transposed_rotations_from_torques_in_s(seed: int, amplitude: float) -> None:
+    """Said to be in S, and read row by row: to first order torques in S fit, too, of a load on the other side."""
+    made = in_base(swaying(seed, amplitude, 10.0, down=1), "force", "torque")
+    (right,) = made.streams
+    channels = {**right.channels, "rotation": np.swapaxes(right.channels["rotation"], 1, 2)}
+    del channels["position"]
+    read, findings = examine(replace(made, streams=(replace(right, channels=channels, frames={}),)))
+    assert [f.code for f in findings] == ["gravity-frame"] * 2
+    assert read.streams[0].frames == {"force": "W", "torque": "W"}
+    np.testing.assert_allclose(read.streams[0].channels["rotation"], right.channels["rotation"], atol=1e-9)
 
 
 def test_rotations_as_given_are_silent(made: Recording) -> None:

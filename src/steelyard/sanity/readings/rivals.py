@@ -7,7 +7,8 @@ A rival is claimed only where it
 * leaves less than half of what a freely tilted gravity would leave.
 
 Forces in the axes of W point down however the rotations are read, so that beside them torques decide: a rival way to
-read the rotations leaves a tenth of the torque variance, and half of what any other, or other axes, would leave.
+read the rotations leaves a tenth of the torque variance, and half of what any other, or other axes, would leave. Of a
+load that stands upright, torques in S beside forces in W look like rotations that are turned round.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 
 from steelyard.check import Array, frozen
 from steelyard.findings import Finding
-from steelyard.logs.misread import INVERTED, MISREAD, Misread
+from steelyard.logs.misread import INVERTED, MISREAD, TURNED_ROUND, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.glance import Glance, glance, in_axes
 from steelyard.sanity.readings.orders import order_of_forces
@@ -133,8 +134,11 @@ def _best_by_torque(recording: Recording, view: Glance, given: Reading) -> Readi
     if not rivals or rivals[0].left > BY_TORQUE * given.fit.torque_share:
         return None
     in_sensor = reading_of(replace(view, world=frozenset({"force"})), "", given.gravity, view.rotation)
-    others = (in_sensor.fit.torque_share, *(rival.left for rival in rivals[1:]))
-    return rivals[0] if rivals[0].left < BESIDE * min(others) else None
+    # Where rotations are turned round, positions may be, too: in slow motion either fits, and hardly matters.
+    turned = [r for r in rivals if r.misread in (TURNED_ROUND, INVERTED)]
+    alike = turned if rivals[0] in turned else rivals[:1]
+    others = (in_sensor.fit.torque_share, *(r.left for r in rivals if r not in alike))
+    return min(alike, key=lambda r: r.fit.cost) if rivals[0].left < BESIDE * min(others) else None
 
 
 def misread_rotations(recording: Recording, view: Glance, given: Reading) -> Iterator[Reading]:
@@ -177,7 +181,11 @@ def _in_other_axes(recording: Recording, view: Glance, given: Reading) -> Iterat
         if other is not None
     ]
     yield from found[:1]
-    yield from (r for r in found[1:] if r.fit.torque_share < BESIDE * found[0].fit.torque_share)
+    alone = next((r for r in found[1:] if r.fit.torque_share < BESIDE * found[0].fit.torque_share), None)
+    if alone is not None and (whole := views[both]) is not None:
+        # Rotations that are misread may do so better still, with the torques in the axes of the forces.
+        misread = _best_by_torque(in_axes(recording, both), whole, found[0])
+        yield from () if misread is not None else (alone,)
 
 
 def _misread_in_other_axes(others: Iterable[Meant], gravity: Array) -> Iterator[Reading]:
