@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import os
 import re
@@ -84,9 +83,6 @@ def say_if_compiling() -> None:
         def on_start(self, event: Any) -> None:
             if not self.said:
                 self.said = True
-                # A compiler keeps most of what it makes: to look through it for rubbish takes a fourteenth of its time.
-                gc.freeze()
-                gc.set_threshold(100_000)
                 say("Compiling numerical kernels, each the first time it is used (up to some minutes) ...")
 
         def on_end(self, event: Any) -> None:
