@@ -342,7 +342,7 @@ def test_wrong_arrays(tmp_path: Path) -> None:
     npz(tmp_path)
     assert message(write(tmp_path, swap(NPZ, '["force"]', '["forces"]')), BadDescription) == (
         'log.toml, [[stream]] 1 ("a.npz"), force: there is no column "forces". Did you mean "force"? '
-        "Columns here: force, torque, R, t."
+        "Columns here: force[0..2], torque[0..2], R[0..8], t."
     )
 
 

@@ -366,6 +366,43 @@ def test_the_example_of_a_bag_with_joints_alone(tmp_path: Path) -> None:
     assert said.endswith('[robot]\nurdf        = "arm.urdf"   # put the file of your arm here\nsensor_link = "ft"\n')
 
 
+LIST = "std_msgs/msg/Float64MultiArray"
+
+
+def listed(topic: str, rows: np.ndarray) -> list[Message]:
+    """Return messages that hold the rows as bare lists."""
+    layout = ROS2.types["std_msgs/msg/MultiArrayLayout"]([], 0)
+    return [(topic, LIST, START + 10_000_000 * n, ROS2.types[LIST](layout, row)) for n, row in enumerate(rows)]
+
+
+@pytest.mark.parametrize("form", ["columns", "rows", "quaternion-xyzw"])
+def test_a_bag_of_bare_lists_is_told_what_they_look_like(tmp_path: Path, form: str) -> None:
+    _, wrench, R = log_of(Maker(ROS2), 1600)
+    place = np.tile([0.4, 0.0, 0.3], (1600, 1))
+    poses = np.tile(np.eye(4), (1600, 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = R.matrix, place
+    held = {
+        "columns": poses.transpose(0, 2, 1).reshape(-1, 16),
+        "rows": poses.reshape(-1, 16),
+        "quaternion-xyzw": np.concatenate([place, np.roll(R.quaternion_wxyz(), -1, -1)], 1),
+    }[form]
+    joints = np.zeros((1600, 7))
+    messages = [*listed("/a/joints", joints[:, :6]), *listed("/b/joints", joints), *listed("/ee", held)]
+    write_bag(tmp_path / "run", [*messages, *listed("/F_ext", wrench)])
+    said = message(tmp_path / "run")
+    (tmp_path / "log.toml").write_text(said[said.index("[log]") :])
+    assert sy.identify(tmp_path / "log.toml").mass == pytest.approx(MASS, rel=2e-3)
+
+
+def test_a_bag_with_nothing_of_use_is_told_where_to_put_what(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run", listed("/joints", np.zeros((20, 7))))
+    said = message(tmp_path / "run")
+    assert 'topic    = "/wrench"   # put your topic here\n' in said
+    assert 'topic    = "/tf"   # put your topic here\n' in said
+    wrong = DESCRIPTION.replace("/ft", "/joints").replace("/pose", "/joints")
+    assert "data[0..6], stamp, received." in message(describe(tmp_path, "run", wrong))
+
+
 STREAM = 'log.toml, [[stream]] 1 ("run")'
 TOPICS = "Topics here: /ft (20 WrenchStamped), /pose (20 PoseStamped)."
 EXAMPLE = """\

@@ -67,3 +67,9 @@ def test_filters_side_by_side_are_those_one_by_one():
         kept = forward(clock, values, 4, np.array([scale]), True)
         assert kept[0].shape == (50, 4, 3)
         np.testing.assert_allclose([quad[k], log_det[k], count], [kept[3][0], kept[4][0], kept[5]], rtol=1e-12)
+
+
+def test_the_likelihood_stays_finite_where_every_step_is_a_gap():
+    clock, values = 1e4 * np.arange(40.0), np.zeros((40, 1))
+    *_, log_det, _ = forward(clock, values, 5, np.array([1.0, 1e4**0.5]), False)
+    assert np.isfinite(log_det).all()

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.spatial import Rotation
 
@@ -55,6 +55,20 @@ def _of_matrix(matrix: Array) -> Rotation:
     for _ in range(3):  # Newton-Schulz: squares the error and keeps the polar factor, much faster than an SVD
         matrix = matrix - 0.5 * matrix @ _excess(matrix)
     return Rotation(matrix)
+
+
+def matrix_order(sixteen: Array) -> Integers | None:
+    """Return which of sixteen numbers (N, 16) is where in a 4 x 4 matrix (4, 4); None where they hold no poses.
+
+    Its last row shows whether they go row by row or column by column.
+    """
+    grid = np.arange(16).reshape(4, 4)
+    for order in (grid, grid.T):
+        last, turn = sixteen[:, order[3]], sixteen[:, order[:3, :3]]
+        moves = np.abs(sixteen[:, order[:3, 3]]).max(initial=0.0) > 0
+        if moves and np.abs(last - [0, 0, 0, 1]).max() < ROUNDING and np.abs(_excess(turn)).max() < ROUNDING:
+            return order
+    return None
 
 
 def _excess(matrix: Array) -> Array:

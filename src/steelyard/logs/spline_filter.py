@@ -11,7 +11,7 @@ from numba import njit
 
 _WIDE = 1e6  # variance of the start, where that of a measurement is 1
 WARM_UP = 6  # innovations left out of the likelihood: the start is not known
-_FACTORS = 16  # variances multiplied before a logarithm is taken: fewer than overflow, most of a logarithm saved
+_FACTORS = 4  # variances multiplied before a logarithm is taken: none overflows, most of a logarithm is saved
 
 
 @njit(cache=True, error_model="numpy")

@@ -14,7 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile
-from steelyard.io.rotations import ROUNDING
+from steelyard.io.rotations import matrix_order
 from steelyard.io.streams.usual_names import WANTED, Names, matrix_parts
 from steelyard.io.tables.files import Table
 
@@ -69,18 +69,12 @@ def _vector(name: str) -> list[str]:
 
 def _pose(name: str, run: Sequence[int], found: Array | None) -> dict[str, int]:
     """Return the names of rotation and position in sixteen columns that hold poses (N, 16); else none."""
-    if found is None or not len(found):
+    order = None if found is None else matrix_order(found)
+    if order is None:
         return {}
-    grid = np.arange(16).reshape(4, 4)
-    for order in (grid, grid.T):
-        last, turn = found[:, order[3]], found[:, order[:3, :3]]
-        square = np.einsum("nji,njk->nik", turn, turn)
-        moves = np.abs(found[:, order[:3, 3]]).max() > 0
-        if moves and np.abs(last - [0, 0, 0, 1]).max() < ROUNDING and np.abs(square - np.eye(3)).max() < ROUNDING:
-            turned = zip(matrix_parts(name), order[:3, :3].ravel(), strict=True)
-            placed = zip(_vector(f"{name}_position"), order[:3, 3], strict=True)
-            return {part: run[k] for part, k in (*turned, *placed)}
-    return {}
+    turned = zip(matrix_parts(name), order[:3, :3].ravel(), strict=True)
+    placed = zip(_vector(f"{name}_position"), order[:3, 3], strict=True)
+    return {part: run[k] for part, k in (*turned, *placed)}
 
 
 def open_quaternion(names: Names) -> tuple[tuple[int, ...], bool]:

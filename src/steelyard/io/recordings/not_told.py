@@ -56,7 +56,7 @@ def cannot_tell(table: Table, reason: str, lines: Mapping[str, str]) -> NoDescri
     """Return the error; `lines` are those of a description that the names of the file do tell."""
     count = None if table.header.names else table.header.count
     example = example_of(table.path.name, lines, count)
-    shown = f"Columns here: {listed(_shown(table))}." if count is None else f"It has {count} columns."
+    shown = f"Columns here: {listed(table.header.shown())}." if count is None else f"It has {count} columns."
     return NoDescription(
         f"{table.path}: cannot tell what the columns are: {reason}. {shown}{_lying(table)} "
         "Write a description that says it, for example:",
@@ -70,12 +70,6 @@ def _to_check(table: Table, reason: str, lines: Mapping[str, str]) -> NoDescript
         return cannot_tell(table, reason, lines)
     words = f"{table.path}: needs a description: {reason}.{_lying(table)} Check this one, made of its names:"
     return NoDescription(words, example_of(table.path.name, lines))
-
-
-def _shown(table: Table) -> list[str]:
-    """Return the names of the columns; of arrays with several with their number, as "wrench[0..5]"."""
-    groups = table.header.groups
-    return [f"{name}[0..{len(groups[name]) - 1}]" if name in groups else name for name in table.header.shown()]
 
 
 def _lying(table: Table) -> str:

@@ -19,9 +19,9 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile, NoDescription
+from steelyard.io.bag_example import bag_example
 from steelyard.io.bags import TRANSFORMS, Bag, open_bag
 from steelyard.io.contents import require_bounded
-from steelyard.io.example import bag_example, first_wrench, frames_of
 from steelyard.io.tables.files import Columns, Header
 
 STAMP, RECEIVED = "stamp", "received"
@@ -193,10 +193,8 @@ def _labels(message: Any) -> tuple[str, ...]:
 
 
 def _which_topic(bag: Bag) -> NoDescription:
-    wrench = first_wrench(bag.topics)
-    example = bag_example(bag.path.name, bag.topics, frames_of(bag, wrench.name if wrench else None))
     return NoDescription(
         f"{bag.path}: a bag needs a description that says which topic is what. {bag.told()} "
         "Write one beside the bag, for example:",
-        example,
+        bag_example(bag),
     )

@@ -49,9 +49,15 @@ class Header:
         return apart(self.names[column])[1] or (self.units[column].strip("[]() ") if self.units else "")
 
     def shown(self) -> list[str]:
-        """Return the names to list in a message: arrays with several columns appear once."""
+        """Return the names to list in a message: arrays with several columns appear once, as "data[0..5]"."""
         inner = {n for group in self.groups.values() for n in group}
-        return [*self.groups, *(name for n, name in enumerate(self.names or ()) if n not in inner)]
+        arrays = (self._range(name, group) for name, group in self.groups.items())
+        return [*arrays, *(name for n, name in enumerate(self.names or ()) if n not in inner)]
+
+    def _range(self, name: str, group: tuple[int, ...]) -> str:
+        """Return an array's name with the first and the last of its columns, where they are called by it."""
+        first, last = ((self.names or ())[n].removeprefix(name) for n in (group[0], group[-1]))
+        return f"{name}{first[:-1]}..{last[1:]}" if first.startswith("[") else name
 
 
 class Table(Protocol):
@@ -139,7 +145,7 @@ def _find(header: Header, column: Column, where: str) -> tuple[int, ...]:
         raise BadDescription(
             f'{where}: the name "{column}" stands over {found} columns. Rename all but one, or give column numbers.'
         )
-    there = header.shown()
+    there = [*header.groups, *header.names]
     raise BadDescription(
-        f'{where}: there is no column "{column}".{close_match(column, there)} Columns here: {listed(there)}.'
+        f'{where}: there is no column "{column}".{close_match(column, there)} Columns here: {listed(header.shown())}.'
     )
