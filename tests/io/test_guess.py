@@ -385,6 +385,17 @@ def test_angles_need_a_description_whose_line_is_shown(tmp_path: Path, names: li
     assert read_recording(tmp_path / "log.toml").streams[0].channels["rotation"].shape == (2, 3, 3)
 
 
+def test_the_description_of_a_table_of_poses_says_so(tmp_path: Path) -> None:
+    names = ["fx", "fy", "fz", "tx", "ty", "tz", "roll", "pitch", "yaw"]
+    forces = 5 * np.random.default_rng(0).normal(size=(6, 3))
+    with pytest.raises(BadDescription) as caught:
+        bare(tmp_path, names, *([*force, 0.1, 0, 0, 20 * n, 0, 0] for n, force in enumerate(forces)))
+    text = str(caught.value)
+    assert 'kind     = "poses"   # each row is a still pose: check\nforce ' in text
+    (tmp_path / "log.toml").write_text(text[text.index("[log]") :])
+    assert read_recording(tmp_path / "log.toml").streams[0].poses
+
+
 def test_a_rotation_that_is_read_is_not_asked_for_in_angles(tmp_path: Path) -> None:
     names = ["fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw"]
     stream = bare(tmp_path, names, [*W, *Q, 1, 2, 3])

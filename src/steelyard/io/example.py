@@ -59,7 +59,7 @@ def example_of(path: str, lines: Mapping[str, str], count: int | None = None) ->
     """
     attitude = next((name for name in _ATTITUDES if name in lines), "rotation")
     rows = {"path": toml_string(path)}
-    for name in ("time", "force", "torque", attitude):
+    for name in ("kind" if "kind" in lines else "time", "force", "torque", attitude):
         mark = "put your columns here" + _ELSE.get(name, "")
         usual = f"{_USUAL.get(name)}   # {mark}"
         if count is not None:

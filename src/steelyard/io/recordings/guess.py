@@ -16,7 +16,14 @@ from steelyard.check import Array, Mask
 from steelyard.io.entries import listed
 from steelyard.io.recordings.counted import counted, part_names
 from steelyard.io.recordings.description import ASSUMED, Description, default_gravity
-from steelyard.io.recordings.not_told import cannot_tell, left_out, numbered_lines, own_lines, require_told
+from steelyard.io.recordings.not_told import (
+    cannot_tell,
+    left_out,
+    numbered_lines,
+    own_lines,
+    require_told,
+    turns_each_row,
+)
 from steelyard.io.streams.channels import channel_with_gaps, stand_apart
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.streams.usual_names import STEMS, Names, compared
@@ -25,9 +32,6 @@ from steelyard.io.units import SLOWEST, UNITS, apart, converted, median_size, st
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
 _NO_UNIT = {"", "-", "–"}  # what a row of units holds where there is none
-
-# Half and twice as much do as well: logs turn by a degree or two from row to row, tables of poses by twenty and more.
-_NEW_POSE = float(np.cos(np.radians(5)))
 
 
 def describe(table: Table) -> tuple[Description, Columns]:
@@ -49,7 +53,7 @@ def describe(table: Table) -> tuple[Description, Columns]:
         units = ("s", "ns") if len(stamps) > 1 else (_time_unit(table, names, stamps[0], cells),)
         time = TimeSpec(stamps, units, 0.0, "time")
     gravity, notes = _gravity(specs, cells)
-    poses = time is None and _turns_each_row(specs, cells, gravity)
+    poses = time is None and _each_row_is_a_pose(specs, cells, gravity)
     where = table.path.name
     located = [QuantitySpec(s.name, s.columns, s.unit, f"{where}, {s.name}", s.form, s.frame) for s in specs]
     time = time and replace(time, where=f"{where}, time")
@@ -162,11 +166,8 @@ def _gravity(specs: Sequence[QuantitySpec], cells: Columns) -> tuple[Array, tupl
     )
 
 
-def _turns_each_row(specs: Sequence[QuantitySpec], cells: Columns, gravity: Array) -> bool:
+def _each_row_is_a_pose(specs: Sequence[QuantitySpec], cells: Columns, gravity: Array) -> bool:
     """Whether gravity turns by more than 5 degrees from row to row: then each row is a still pose."""
     spec = next(s for s in reversed(specs) if s.name in ("rotation", "gravity", "specific_force"))
     values = channel_with_gaps(spec, [cells[int(n)].astype(np.float64) for n in spec.columns], gravity)
-    down = values[:, 2] if spec.form else values / np.linalg.norm(values, axis=-1, keepdims=True)
-    cosine = np.einsum("ni,ni->n", down[1:], down[:-1])
-    cosine = cosine[np.isfinite(cosine)]
-    return bool(len(cosine)) and float(np.median(cosine)) < _NEW_POSE
+    return turns_each_row(values[:, 2] if spec.form else values)

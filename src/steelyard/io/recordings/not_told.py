@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
+from steelyard.check import Array
 from steelyard.errors import NoDescription
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
@@ -15,6 +18,9 @@ from steelyard.io.units import ANGLE, SLOWEST, UNITS, angle_unit, length_unit, s
 ATTITUDES = {"rotation", "gravity", "specific_force"}
 _OF_S = "of S in W; check the unit"
 _ORDERS = ("quaternion-xyzw", "quaternion-wxyz")
+
+# Half and twice as much do as well: logs turn by a degree or two from row to row, tables of poses by twenty and more.
+_NEW_POSE = float(np.cos(np.radians(5)))
 
 
 def require_told(table: Table, names: Names, found: Sequence[str]) -> None:
@@ -103,7 +109,20 @@ def own_lines(table: Table, names: Names) -> dict[str, str]:
         unit = angle_unit(values(table, found)) or "rad"
         lines["joint_position"] = line(table, found, f'unit = "{unit}"', "from base to sensor")
         lines.pop("position", None)  # which joints tell, too
+    if "time" not in lines and (force := names.vector("force")) and turns_each_row(values(table, force)):
+        lines["kind"] = '"poses"   # each row is a still pose: check'
     return lines
+
+
+def turns_each_row(vectors: Array | None) -> bool:
+    """Whether vectors (N, 3) turn by more than 5 degrees from row to row: then each row is a still pose."""
+    if vectors is None or len(vectors) < 2:
+        return False
+    with np.errstate(invalid="ignore"):
+        along = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    cosine = np.einsum("ni,ni->n", along[1:], along[:-1])
+    cosine = cosine[np.isfinite(cosine)]
+    return bool(len(cosine)) and float(np.median(cosine)) < _NEW_POSE
 
 
 def numbered_lines(table: Table) -> dict[str, str]:
