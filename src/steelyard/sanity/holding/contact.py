@@ -36,6 +36,9 @@ SLICE, FEWEST_ROWS, MOST_SLICES, FEWEST_SLICES = 0.1, 4, 3000, 20
 SURPRISE, RATIO, SMALLEST_TORQUE, SMALLEST_FORCE = 10.0, 2.0, 0.05, 0.5
 # ... and above this share of the weight: a base tilted by 2 degrees or 3 % of cross-talk look like less.
 LEAST_SHARE = 0.12
+# ... unless it is short and stands out so far from all other times, of which some have gravity as near [rad] to where it
+# has it: errors that hang on the pose would show in those as well.
+SHORT, NEAR = 0.25, np.radians(20.0)
 # A push has no longer lever than this [m], beside a twist of the hand [N m]; and leaves this share of the log alone.
 LONGEST_PUSH, LARGEST_TWIST, LEAST_LEFT = 2.0, 3.0, 0.22
 # A touch begins and ends gently: this share of its length is left out on either side, one to LONGEST_GUARD slices.
@@ -119,7 +122,7 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
         return _after_change(log, with_bias, change)
     found = _likelier(slices, found, touches)
     touches = _touches(slices, found, memory)
-    touches = [t for t in touches if _large(found.x, t)]
+    touches = [t for t in touches if _large(found.x, t) or _apart(slices, found, t)]
     guarded = _away(touches, len(slices.y), guarded=True)
     if not touches or not _possible(found.x, touches) or guarded.mean() < LEAST_LEFT:
         return everything, ()
@@ -190,6 +193,23 @@ def _large(x: Array, touch: Touch) -> bool:
     return touch.force > least_force or touch.torque > max(SMALLEST_TORQUE, LEAST_SHARE * weight * lever)
 
 
+def _apart(slices: Slices, found: Consensus, touch: Touch) -> bool:
+    """Whether a short touch stands out from what is kept, in which gravity lies as it does in the touch."""
+    kept = found.kept
+    if touch.last - touch.first > SHORT * len(kept) or kept.mean() < 1 - SHORT or not _stands_out(found, touch):
+        return False
+    felt = slices.A[:, 3:, 0]  # the force of a kilogram: along gravity but for accelerations
+    up = felt / np.linalg.norm(felt, axis=1, keepdims=True)
+    nearest = (up[touch.first : touch.last] @ up[kept].T).max(1)
+    return bool((nearest > np.cos(NEAR)).all())
+
+
+def _stands_out(found: Consensus, touch: Touch) -> bool:
+    """Whether the extra force or torque is far beyond what the rest leaves of the wrench."""
+    torque, force = np.sqrt((found.residual[found.kept].reshape(-1, 2, 3) ** 2).sum(2).mean(0))
+    return bool(touch.force > STANDS_OUT * force or touch.torque > STANDS_OUT * torque)
+
+
 def _possible(x: Array, touches: Sequence[Touch]) -> bool:
     """Whether a robot may hold the body x and a hand may push so; if not, units or frames are wrong."""
     body = x[0] > 0 and np.linalg.norm(x[1:4]) < LONGEST_LEVER * x[0]
@@ -198,10 +218,7 @@ def _possible(x: Array, touches: Sequence[Touch]) -> bool:
 
 def _left_out(found: Consensus, touches: Sequence[Touch], kept: Mask) -> bool:
     """Whether the touches are to be left out: not much of the log, or far beyond what the rest leaves of the wrench."""
-    if kept.mean() >= 1 - MUCH:
-        return True
-    torque, force = np.sqrt((found.residual[found.kept].reshape(-1, 2, 3) ** 2).sum(2).mean(0))
-    return any(t.force > STANDS_OUT * force or t.torque > STANDS_OUT * torque for t in touches)
+    return bool(kept.mean() >= 1 - MUCH) or any(_stands_out(found, t) for t in touches)
 
 
 def _with_drift(slices: Slices, late: Array) -> Slices:
