@@ -238,6 +238,25 @@ def test_of_a_load_picked_up_or_put_down_the_loaded_side_is_kept(motion: str, at
         assert mask.mean() > 0.8 * (1 - empty.mean())
 
 
+@pytest.mark.parametrize(("name", "first"), [("hammer", 6.0), ("hammer", 13.0), ("drill", 12.0)])
+def test_of_two_loads_with_a_pause_between_one_is_kept(name: str, first: float) -> None:
+    once, other = made(name, "stop_go", "low", 1), made("bottle", "stop_go", "low", 2)
+    twice = np.tile(np.arange(len(once)), 2)
+    log = replace(once.rows(twice), noise=None, time=np.append(once.time, once.time + 10))
+    time = log.time[:, None]
+    wrench = np.where(time < first + 2, BIAS, other.rows(twice).wrench)
+    log = replace(log, wrench=np.where(time < first, log.wrench, wrench))
+    mask, (finding, *more) = untouched(log, True)
+    assert not more
+    assert finding.code == "load-changed"
+    assert "was put down or lost" in finding.message
+    assert "was picked up" in finding.message
+    at = sorted(float(t) for t in re.findall(r"at (\d+\.\d) s", finding.message.lower()))
+    assert at == pytest.approx([first, first + 2], abs=0.3)
+    kept = name if first > 9 else "bottle"
+    assert NoiseAware().identify(log.rows(mask)).parameters.mass == pytest.approx(mass_of(kept), rel=0.01)
+
+
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("spectrum", ["white", "2hz"])
 @pytest.mark.parametrize("level", ["none", "low", "moderate", "high"])

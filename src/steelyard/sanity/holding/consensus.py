@@ -50,6 +50,10 @@ class Slices:
     weight: Array
     ridge: Array
 
+    def part(self, index: slice) -> Slices:
+        """Return some of them."""
+        return Slices(self.A[index], self.y[index], self.time[index], self.weight[index], self.ridge)
+
 
 @dataclass(frozen=True, eq=False)
 class Consensus:

@@ -3,73 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.special import chdtrc
 
-from steelyard.check import Array, Integers, Mask
+from steelyard.check import Mask
 from steelyard.findings import Finding
-from steelyard.inertia.regressor import design
-from steelyard.logs.autocorrelation import correlation_time
 from steelyard.logs.clock import median_step
-from steelyard.logs.drift import STEADILY, settled_course
 from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import features
-from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.logs.runs import runs
 from steelyard.sanity.holding import consensus
-from steelyard.sanity.holding.consensus import LEVER, Consensus, Slices
-from steelyard.sanity.holding.load_change import (
-    HANDS,
-    LONGEST_LEVER,
-    SHARE,
-    SHORTEST,
-    LoadChange,
-    find_change,
-    kept_side,
+from steelyard.sanity.holding.consensus import Consensus, Slices
+from steelyard.sanity.holding.load_change import HANDS, SHARE, SHORTEST, LoadChange, find_change, kept_side
+from steelyard.sanity.holding.touch import (
+    FEWEST_SLICES,
+    Touch,
+    apart,
+    away,
+    large,
+    memory_of,
+    possible,
+    slices_of,
+    stands_out,
+    touches_of,
 )
 
-# Slices last this long [s] or hold this many rows; a log of fewer slices is not judged.
-SLICE, FEWEST_ROWS, MOST_SLICES, FEWEST_SLICES = 0.1, 4, 3000, 20
-# Contact: less likely than 10^-SURPRISE by chance, a squared misfit above RATIO, and above these [N m, N].
-SURPRISE, RATIO, SMALLEST_TORQUE, SMALLEST_FORCE = 10.0, 2.0, 0.05, 0.5
-# ... and above this share of the weight: a base tilted by 2 degrees or 3 % of cross-talk look like less.
-LEAST_SHARE = 0.12
-# ... unless it is short and stands out so far from all other times, of which some have gravity as near [rad] to where it
-# has it: errors that hang on the pose would show in those as well.
-SHORT, NEAR = 0.25, np.radians(20.0)
-# A push has no longer lever than this [m], beside a twist of the hand [N m]; and leaves this share of the log alone.
-LONGEST_PUSH, LARGEST_TWIST, LEAST_LEFT = 2.0, 3.0, 0.22
-# A touch begins and ends gently: this share of its length is left out on either side, one to LONGEST_GUARD slices.
-GUARD, LONGEST_GUARD = 0.05, 10
+# What is left alone must be this share of the log.
+LEAST_LEFT = 0.22
 # Touches are alike where one body explains this share of them, with a tolerance no looser than by e^LOOSER.
 ALIKE, LOOSER = 0.9, 0.3
 # A touched time that a jump of bias explains to this squared misfit might as well be the untouched one.
 SAME = 2.0
-# More of the log than this, or more of the motion than that, is more likely misread than touched.
+# More of the log than this, or more of the motion than that, is likelier misread than touched. It is left out if it
+# stands out: the times that happen to agree beside errors that vary with the pose give a worse answer than all.
 MUCH, MOVING = 0.4, 0.8
-# Where it is more than that, it is left out only if the extra force or torque is so many times what the rest leaves:
-# errors that vary with the pose are everywhere, and the times that happen to agree give a worse answer than all.
-STANDS_OUT = 15.0
-# Time constants, as shares of the log, that make up a drift which settles.
-PACES = (1 / 16, 1 / 5)
 ALL_ELSE = (
     "Check what spoils a whole log first: time unit, clocks, axes and signs of the wrench, how the sensor is mounted, "
     "a payload that the controller compensates, a bias that rises and falls. If all are right, "
     "keep hands and fixtures off the object."
 )
 TARED = "If the sensor was tared within the log, cut the log there and identify each piece with its own bias. Else:"
-
-
-@dataclass(frozen=True, eq=False)
-class Touch:
-    """Slices first..last - 1, and the largest extra force [N] and torque [N m] in them."""
-
-    first: int
-    last: int
-    force: float
-    torque: float
 
 
 def untouched(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...]]:
@@ -95,7 +68,7 @@ def agreeing(log: MotionLog, with_bias: bool) -> Mask:
     Unlike `untouched` it asks nothing of the rest: clocks that are late may be what spoils it. Time in which nothing is
     held fits any clock: then it is the rest.
     """
-    sliced = _slices(log, with_bias)
+    sliced = slices_of(log, with_bias)
     if sliced is None:
         return np.ones(len(log), np.bool_)
     slices, row = sliced
@@ -107,138 +80,46 @@ def agreeing(log: MotionLog, with_bias: bool) -> Mask:
 
 def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...]]:
     """Return what `untouched` returns for rows that are in order of time."""
-    everything, sliced = np.ones(len(log), np.bool_), _slices(log, with_bias)
+    everything, sliced = np.ones(len(log), np.bool_), slices_of(log, with_bias)
     if sliced is None:
         return everything, ()
     slices, row = sliced
     found = consensus.largest(slices)
-    memory = correlation_time(np.where(found.kept[:, None], found.residual, 0.0), len(found.kept) / 8, power=2)
-    touches = _touches(slices, found, memory)
+    memory = memory_of(found)
+    touches = touches_of(slices, found, memory)
     if not touches:
         return everything, ()
     change = _explained(slices, found, touches, memory)
+    if change is None and (second := _one_of_two(slices, found, touches)) is not None:
+        return _after_change(log, with_bias, second, touches[0].first > 0)
     # Small errors of model or calibration look like a small slip.
-    if change is not None and (not change.slip or any(_large(found.x, t) for t in touches)):
-        return _after_change(log, with_bias, change)
+    if change is not None and (not change.slip or any(large(found.x, t) for t in touches)):
+        return _after_change(log, with_bias, change, change.loaded_before)
     found = _likelier(slices, found, touches)
-    touches = _touches(slices, found, memory)
-    touches = [t for t in touches if _large(found.x, t) or _apart(slices, found, t)]
-    guarded = _away(touches, len(slices.y), guarded=True)
-    if not touches or not _possible(found.x, touches) or guarded.mean() < LEAST_LEFT:
+    touches = touches_of(slices, found, memory)
+    touches = [t for t in touches if large(found.x, t) or apart(slices, found, t)]
+    guarded = away(touches, len(slices.y), guarded=True)
+    if not touches or not possible(found.x, touches) or guarded.mean() < LEAST_LEFT:
         return everything, ()
     moving = np.bincount(row, ~log.still) > 0.5 * np.bincount(row)
     finding = _contact(slices, found, touches, guarded, _unlike_hands(guarded, moving))
     return (guarded[row] if _left_out(found, touches, guarded) else everything), (finding,)
 
 
-def _after_change(log: MotionLog, with_bias: bool, change: LoadChange) -> tuple[Mask, tuple[Finding, ...]]:
-    """Return the longer or only loaded side of a change, less the time of hands, searched for contact in its turn."""
-    side, finding = kept_side(np.asarray(log.time), change.time, change.words, change.slip > 0, change.loaded_before)
+def _after_change(
+    log: MotionLog, with_bias: bool, change: LoadChange, early: bool | None
+) -> tuple[Mask, tuple[Finding, ...]]:
+    """Return the earlier, later or longer side of a change, less the time of hands, searched for contact in turn."""
+    side, finding = kept_side(np.asarray(log.time), change.time, change.words, change.slip > 0, early)
     kept, more = untouched(log.rows(side), with_bias)
     mask = side.copy()
     mask[side] = kept
     return mask, (finding, *more)
 
 
-def _slices(log: MotionLog, with_bias: bool) -> tuple[Slices, Integers] | None:
-    """Return the slices of an ordered log and the slice of each row (N,); None without a clock, or of too few."""
-    time = log.time
-    if time is None or len(log) < FEWEST_SLICES * FEWEST_ROWS:
-        return None
-    width = max(SLICE, FEWEST_ROWS * median_step(time), float(time[-1] - time[0]) / MOST_SLICES)
-    number = ((time - time[0]) / width).astype(np.int64)
-    edges = np.flatnonzero(np.diff(number, prepend=-1))
-    if len(edges) < FEWEST_SLICES:
-        return None
-    counts = np.diff(np.append(edges, len(log)))
-    z = np.add.reduceat(features(log), edges, axis=0) / counts[:, None]
-    T = design(with_bias)
-    wrench = np.where(log.dead, 0.0, z[:, 12:18])
-    weight = np.minimum(counts / np.median(counts), 1.0)
-    mass = np.linalg.norm(wrench[:, 3:] - np.median(wrench[:, 3:], axis=0), axis=1).max() / 9.8 + 0.1
-    size = mass * np.repeat([1e3, 1e1, 1e-1, 1e3], [1, 3, 6, 6])[: len(T)]
-    slices = Slices(
-        -np.tensordot(z, T, axes=(1, 2)).swapaxes(1, 2) * ~log.dead[:, None],
-        wrench,
-        time[0] + width * (number[edges] + 0.5),
-        weight,
-        size**-2,
-    )
-    return slices, np.repeat(np.arange(len(edges)), counts)
-
-
-def _touches(slices: Slices, found: Consensus, memory: float) -> list[Touch]:
-    """Return the stretches left out that no one body, bias and slow drift explains together with what was kept."""
-    slices = _with_drift(slices, found.late)
-    H, g, c = consensus.sums(slices, found.tolerance)
-    base = _least(slices, H, g, c, found.kept)
-    out = []
-    for a, b in runs(~found.kept).tolist():
-        both = found.kept.copy()
-        both[a:b] = True
-        gain = max(_least(slices, H, g, c, both) - base, 0.0)
-        freedom = 6 * float(slices.weight[a:b].sum())
-        surprise = -np.log10(max(float(chdtrc(freedom / memory, gain / memory)), 1e-300))
-        extra = np.linalg.norm(found.residual[a:b].reshape(-1, 2, 3), axis=2).max(0)
-        if surprise > SURPRISE and gain > RATIO * freedom:
-            out.append(Touch(a, b, float(extra[1]), float(extra[0])))
-    return out
-
-
-def _large(x: Array, touch: Touch) -> bool:
-    """Whether the extra wrench is more than small errors of model, base and calibration may leave on the body x."""
-    weight = ROUNDED_GRAVITY * abs(float(x[0]))
-    lever = LEVER + float(np.linalg.norm(x[1:4])) / max(abs(float(x[0])), 1e-9)
-    least_force = max(SMALLEST_FORCE, LEAST_SHARE * weight)
-    return touch.force > least_force or touch.torque > max(SMALLEST_TORQUE, LEAST_SHARE * weight * lever)
-
-
-def _apart(slices: Slices, found: Consensus, touch: Touch) -> bool:
-    """Whether a short touch stands out from what is kept, in which gravity lies as it does in the touch."""
-    kept = found.kept
-    if touch.last - touch.first > SHORT * len(kept) or kept.mean() < 1 - SHORT or not _stands_out(found, touch):
-        return False
-    felt = slices.A[:, 3:, 0]  # the force of a kilogram: along gravity but for accelerations
-    up = felt / np.linalg.norm(felt, axis=1, keepdims=True)
-    nearest = (up[touch.first : touch.last] @ up[kept].T).max(1)
-    return bool((nearest > np.cos(NEAR)).all())
-
-
-def _stands_out(found: Consensus, touch: Touch) -> bool:
-    """Whether the extra force or torque is far beyond what the rest leaves of the wrench."""
-    torque, force = np.sqrt((found.residual[found.kept].reshape(-1, 2, 3) ** 2).sum(2).mean(0))
-    return bool(touch.force > STANDS_OUT * force or touch.torque > STANDS_OUT * torque)
-
-
-def _possible(x: Array, touches: Sequence[Touch]) -> bool:
-    """Whether a robot may hold the body x and a hand may push so; if not, units or frames are wrong."""
-    body = x[0] > 0 and np.linalg.norm(x[1:4]) < LONGEST_LEVER * x[0]
-    return bool(body and all(t.torque < LONGEST_PUSH * t.force + LARGEST_TWIST for t in touches))
-
-
 def _left_out(found: Consensus, touches: Sequence[Touch], kept: Mask) -> bool:
     """Whether the touches are to be left out: not much of the log, or far beyond what the rest leaves of the wrench."""
-    return bool(kept.mean() >= 1 - MUCH) or any(_stands_out(found, t) for t in touches)
-
-
-def _with_drift(slices: Slices, late: Array) -> Slices:
-    """Return the slices less the late wrench; a bias, where there is none, and its drift are more parameters.
-
-    A drift goes in a line, or settles at any pace.
-    """
-    span = float(np.ptp(slices.time))
-    courses = [settled_course(slices.time, settling) for settling in (STEADILY, *(span * share for share in PACES))]
-    courses += [np.ones(len(slices.time))] * (slices.A.shape[2] == 10)
-    columns = [course[:, None, None] * np.eye(6) for course in courses]
-    ridge = np.append(slices.ridge, np.full(6 * len(courses), slices.ridge.min()))
-    return Slices(np.concatenate([slices.A, *columns], 2), slices.y - late, slices.time, slices.weight, ridge)
-
-
-def _least(slices: Slices, H: Array, g: Array, c: Array, mask: Mask) -> float:
-    """Return the least squared residual of the slices in `mask`."""
-    right = g[mask].sum(0)
-    x = consensus.solve(H[mask].sum(0) + np.diag(slices.ridge), right)
-    return float(c[mask].sum() - right @ x)
+    return bool(kept.mean() >= 1 - MUCH) or any(stands_out(found, t) for t in touches)
 
 
 def _explained(slices: Slices, found: Consensus, touches: Sequence[Touch], memory: float) -> LoadChange | None:
@@ -249,11 +130,40 @@ def _explained(slices: Slices, found: Consensus, touches: Sequence[Touch], memor
     # Of a heavier body than the one that was kept, errors of the model are larger, too.
     tolerance = np.maximum(found.tolerance, consensus.share_of(change.load))
     square = ((change.residual / tolerance) ** 2).mean(1)
-    away = np.abs(slices.time - change.time) > HANDS
-    parts = [square[t.first : t.last][away[t.first : t.last]] for t in touches]
-    quiet = all(part.mean() < SAME for part in parts if len(part)) and square[found.kept & away].mean() < SAME
+    clear = np.abs(slices.time - change.time) > HANDS
+    parts = [square[t.first : t.last][clear[t.first : t.last]] for t in touches]
+    quiet = all(part.mean() < SAME for part in parts if len(part)) and square[found.kept & clear].mean() < SAME
     lasting = max(map(len, parts)) * median_step(slices.time) > SHORTEST / 2
     return change if quiet and lasting else None
+
+
+def _one_of_two(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> LoadChange | None:
+    """Return the change next to what was kept, where all else, up to an end of the log, is two loads with one change.
+
+    So it is where one object was put down and another picked up.
+    """
+    if len(touches) != 1 or 0 < touches[0].first <= touches[0].last < len(slices.y):
+        return None
+    first, last = touches[0].first, touches[0].last
+    rest, mass = slices.part(slice(first, last)), float(found.x[0])
+    if last - first < FEWEST_SLICES or last - first == len(slices.y):
+        return None
+    inner = consensus.largest(rest)
+    memory = memory_of(inner)
+    others = touches_of(rest, inner, memory)
+    change = _explained(rest, inner, others, memory) if others else None
+    if change is None:
+        return None
+    edge = last if first == 0 else first
+    masses = (change.after, mass) if first == 0 else (mass, change.before)
+    return replace(
+        change,
+        time=float(slices.time[edge - 1] + slices.time[edge]) / 2,
+        before=masses[0],
+        after=masses[1],
+        slip=0.0,
+        also=f" (and at {change.time:.1f} s {change.words})",
+    )
 
 
 def _likelier(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> Consensus:
@@ -261,7 +171,7 @@ def _likelier(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> Con
 
     Two touches that happen to press alike are less likely than one touch between them, even a longer one.
     """
-    out = ~_away(touches, len(slices.y))
+    out = ~away(touches, len(slices.y))
     if len(touches) < 2 or len(runs(found.kept)) > 1:
         return found
     other = consensus.refine(slices, consensus.fit(slices, out, found.tolerance), out)
@@ -269,15 +179,6 @@ def _likelier(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> Con
         return found
     looser = float(np.log(other.tolerance / found.tolerance).mean())
     return other if looser < LOOSER and len(runs(~other.kept)) == 1 else found
-
-
-def _away(touches: Sequence[Touch], count: int, guarded: bool = False) -> Mask:
-    """Return the slices (F,) outside every touch, or well away from each where they are `guarded`."""
-    kept = np.ones(count, np.bool_)
-    for t in touches:
-        margin = min(1 + int(np.ceil(GUARD * (t.last - t.first))), LONGEST_GUARD) if guarded else 0
-        kept[max(t.first - margin, 0) : t.last + margin] = False
-    return kept
 
 
 def _contact(slices: Slices, found: Consensus, touches: Sequence[Touch], kept: Mask, unlike_hands: bool) -> Finding:
@@ -325,7 +226,7 @@ def _unlike_hands(kept: Mask, moving: Mask) -> bool:
 
 def _swappable(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> bool:
     """Whether one constant wrench explains the touches, and they last at least half as long as what was kept."""
-    out = ~_away(touches, len(slices.y))
+    out = ~away(touches, len(slices.y))
     if slices.weight[out].sum() < 0.5 * slices.weight[found.kept].sum():
         return False
     rest = (found.residual[out] - np.median(found.residual[out], axis=0)) / found.tolerance[out]

@@ -53,6 +53,7 @@ class LoadChange:
 
     residual, load  (F, 6) what both bodies and the bias leave of the wrench, and what the bodies make of it
     slip            [m] how far the centre of mass moved at the same mass, 0 where the mass changed
+    also            in words, another change before or after it
     """
 
     time: float
@@ -61,6 +62,7 @@ class LoadChange:
     residual: Array
     load: Array
     slip: float = 0.0
+    also: str = ""
 
     @property
     def loaded_before(self) -> bool | None:
@@ -75,9 +77,9 @@ class LoadChange:
         if self.slip:
             return slip_words(self.slip)
         if self.loaded_before is None:
-            return change_words(self.before, self.after)
+            return change_words(self.before, self.after) + self.also
         done = "put down or lost" if self.loaded_before else "picked up"
-        return f"the load of {max(self.before, self.after):.3g} kg was {done}"
+        return f"the load of {max(self.before, self.after):.3g} kg was {done}{self.also}"
 
 
 @dataclass(frozen=True, eq=False)
