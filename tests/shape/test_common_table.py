@@ -15,6 +15,7 @@ from steelyard.shape.scan import fuse
 from steelyard.shape.scans import common_table
 from steelyard.shape.scans.common_table import levelled, slid
 from steelyard.shape.scans.scene import Scene, scene_of
+from steelyard.shape.scans.view_planes import lowest_planes
 from steelyard.shape.views import Views
 from steelyard.simulate.camera import disturbed
 from steelyard.simulate.scanning import Scanned, scan_mesh
@@ -89,6 +90,20 @@ def test_a_wide_low_object_is_not_taken_for_the_table(size: tuple[float, float, 
     _, over, tilt = apart(scene, made.views.X_WC)
     assert over < 1e-4
     assert tilt < np.radians(0.05)
+
+
+@pytest.mark.parametrize("top", [0.0, 0.012], ids=["a-table's-edges", "a-wide-object"])
+def test_of_what_lies_below_a_wide_plane_only_another_plane_is_the_table(top: float) -> None:
+    """Pixels between a small table and the floor, and its sides, hang below it and lie on no plane of their own."""
+    rng = np.random.default_rng(4)
+    x, y = 0.15 * rng.uniform(-1, 1, (2, 4000))
+    hangs = y < -0.07
+    z = np.where(hangs, -0.04 * rng.random(4000) if top == 0 else 0.0, top) + rng.normal(0, 5e-4, 4000)
+    sampled = np.column_stack([x, y, z, np.full(4000, 0.4), np.zeros(4000)])
+    drawn = rng.random((200, 3))
+    found = lowest_planes(sampled, 0.042, 0.002, np.tan(np.radians(8.0)), drawn)[0, 1:]
+    at = np.array([[1.0, -0.1, 0.1], [1.0, 0.1, 0.1], [1.0, 0.0, -0.1]])
+    assert np.abs(at @ found).max() < 0.004
 
 
 @pytest.mark.parametrize("size", [(0.12, 0.08, 0.005), (0.12, 0.005, 0.08)], ids=["lying", "standing"])

@@ -98,6 +98,13 @@ def test_no_point_has_the_colour_of_the_table(scan: Scan) -> None:
     assert (red > 60).mean() > 0.995  # the box is red, the table is not
 
 
+def test_views_without_colour_give_the_same_points_and_say_which_were_seen(box: Scanned, scan: Scan) -> None:
+    bare = fuse(replace(box.views, rgb=None))
+    np.testing.assert_array_equal(bare.cloud.xyz, scan.cloud.xyz)
+    assert (bare.cloud.rgb, bare.cloud.seen.sum()) == (None, bare.seen)
+    assert shape_of(bare).findings == ()
+
+
 def test_the_same_views_give_the_same_cloud(box: Scanned, scan: Scan) -> None:
     assert np.array_equal(fuse(box.views).cloud.xyz, scan.cloud.xyz)
 

@@ -55,6 +55,20 @@ def test_turns_that_a_surface_does_not_show_do_not_count_as_moves(long: float, s
     assert seen > 0.9 * moved if shown else seen < 0.1 * moved
 
 
+def test_moves_toward_a_ball_count_and_those_about_it_do_not() -> None:
+    """Of noisy points no turn about its middle is quite without a shift."""
+    rng = np.random.default_rng(0)
+    normal = rng.normal(size=(2000, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    xyz = 0.03 * normal + rng.normal(0, 5e-4, (2000, 3))
+    given = wrist_arc(np.zeros(3), 0.4, count=24)
+    toward = given.position / np.linalg.norm(given.position, axis=1)[:, None]
+    moved = Pose(given.rotation, given.position + 0.002 * toward)
+    assert moved_m(given, moved, xyz, normal) == pytest.approx(0.002, rel=0.1)
+    about = Pose(given.rotation, given.position + 0.002 * np.cross(toward, [0.0, 0.0, 1.0]))
+    assert moved_m(given, about, xyz, normal) < 3e-4
+
+
 def test_an_error_at_the_wrist_is_found_and_the_place_is_right() -> None:
     true, whole = wrist_arc(np.zeros(3), 0.35, 36), moved_by(np.random.default_rng(0))
     placed = placement(true @ HAND_EYE, whole @ true, whole.apply(MIDDLE))

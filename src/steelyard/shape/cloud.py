@@ -29,7 +29,7 @@ class Cloud:
     label    (N,) label of the true part that each point lies on, None where it is not known
     normals  (N, 3) unit vectors that leave the solid, None where they are not known
     seen     (N,) whether a camera saw the colour of each point; the rest have that of the nearest that one saw.
-             None where all were seen
+             Without colours, whether one saw the point. None where all were seen
     left_out how many further points were given without a finite place or normal
     kept     what the scan said that the cloud was written by; None where it comes from elsewhere
     """

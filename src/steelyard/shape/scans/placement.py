@@ -20,6 +20,7 @@ _BENT = 0.03  # of an error at the wrist: moves are put together as vectors, whi
 _FEW = 12  # views that can tell such an error from a wrong lens, and how theirs hang together
 _LEAST = 1e-12  # share of the moves that is no variance
 _SHOWN = 0.01  # mean square along normals of a move of 1 rms of the surface: of less only noise is seen
+_HARDLY = 1e-3  # of what a turn that shows nothing moves a camera by: of a ball's, so little is chance, and no move
 _BLOCKS = 10  # of views one after the other, whose errors may hang together
 
 
@@ -51,7 +52,7 @@ def moved_m(given: Pose, found: Pose, xyz: Array, normal: Array) -> float:
     arm = (given.position - middle)[:, None]
     by_free = np.swapaxes(np.cross(free[:, :3] / size, arm) + free[:, 3:], 1, 2)
     moves = (found.position - given.position)[..., None]
-    left = moves - by_free @ (np.linalg.pinv(by_free) @ moves)
+    left = moves - by_free @ (np.linalg.pinv(by_free, rcond=_HARDLY) @ moves)
     return float(np.sqrt((left**2).sum((1, 2)).mean()))
 
 

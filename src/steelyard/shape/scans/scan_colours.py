@@ -18,10 +18,10 @@ _ALIKE = 12.0  # levels between colours that look the same, at least
 
 def colours_of(scene: Scene, xyz: Array, normal: Array, seen: int) -> tuple[Any, Any]:
     """Return colours (N, 3), and which of them (N,) the views show: of the first `seen` points, those that do not mix
-    with the table. The rest have the colour of the nearest of those.
+    with the table. The rest have the colour of the nearest of those. Views without colour show the first `seen`.
     """
     if (images_rgb := scene.views.rgb) is None:
-        return None, None
+        return None, np.arange(len(xyz)) < seen
     shown, rgb = np.zeros(len(xyz), bool), np.zeros((len(xyz), 3), np.uint8)
     clear, enough = _CLEAR * scene.sigma, scene.enough
     rgb[:seen], shown[:seen] = sight_lines.colours(

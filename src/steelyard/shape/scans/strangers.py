@@ -18,6 +18,7 @@ from steelyard.shape.scans.scene import WINDOW, Scene
 from steelyard.shape.scans.sight_lines import said
 
 _STANDS_OUT = 4.0  # times the depth noise: what is higher is not the table
+_CLEARLY = 0.004  # behind a point, beside the noise: a view that is a little off sees past edges by less [m]
 _PAST, _AGREED = 0.2, 0.05  # of the object's surface that a view sees past: it contradicts the others; it agrees
 _MOST = 0.75  # of the views agree where some of them are wrong in their poses, and not all in something else
 _FEW = 30  # points of which a view says too little to judge it
@@ -28,7 +29,7 @@ def strangers(scene: Scene, seen: Seen) -> Any:
     """Return which of the views (V,) see past so much of the object's surface, as most show it, that they are wrong."""
     xyz, normal, support = settled_patches(scene, seen.model, WINDOW, 1)
     rows = (support[:, 0] >= scene.enough) & (xyz[:, 2] > _STANDS_OUT * scene.sigma)
-    on, past = said(scene.images, xyz[rows], normal[rows], WINDOW, scene.noise).T
+    on, past = said(scene.images, xyz[rows], normal[rows], _CLEARLY, scene.noise).T
     share = past / np.maximum(on + past, 1)
     agreed = float(np.mean(share < _AGREED))
     return (share > _PAST) & (on + past >= _FEW) & (agreed >= _MOST)

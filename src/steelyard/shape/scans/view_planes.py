@@ -15,7 +15,8 @@ INCIDENCE = 0.7  # heights over a table, over depth errors: the cosine of incide
 _AROUND, _CLEARLY = 0.35, 0.75
 _FEW = 30  # points of one view that its noise is not told from
 _JUDGING = 300  # of its points judge a plane
-_UNDER = 4.0  # points on a plane that one under it outweighs: the table may be a fifth of what a view shows
+_LEAST = 0.2  # of a view's points near the table: fewer lie on a plane only where it cuts what is no plane, or steeper
+_UNDER = 0.2  # of the points on a plane: so many on one lower plane are the table, and the first is a wide object's
 
 
 def table_noise(sampled: Array, xyz: Array, distance: float, unit: float, views: int) -> float:
@@ -104,8 +105,9 @@ def lowest_planes(sampled: Array, reach: float, clear: float, steepest: float, d
     steepest  slope that none has
     drawn     (T, 3) numbers in [0, 1) that choose the points of T planes to try
 
-    The plane with most points on it, those under it counted as so many that a wide object does not pass for the
-    table: nothing lies under that. Views of few points have none.
+    The plane with most points on it, unless those under it have a plane of their own: so a wide object does not pass
+    for the table. What hangs under a small table's edges has none. Views of few points have none, nor such as show
+    no plane.
     """
     out, count, end = np.empty((len(sampled) // _FEW + 1, 4)), 0, 0
     near = np.empty(len(sampled), np.int64)
@@ -118,31 +120,42 @@ def lowest_planes(sampled: Array, reach: float, clear: float, steepest: float, d
             end += 1
         if n < _FEW:
             continue
+        tried = np.zeros((len(drawn) + 1, 3))  # the first is the level one
+        for t in range(len(drawn)):
+            tried[t + 1] = _through(sampled, near[(n * drawn[t]).astype(np.int64)])
+        tried = tried[(np.abs(tried[:, 0]) <= reach) & (np.hypot(tried[:, 1], tried[:, 2]) <= steepest)]
         judges = sampled[near[: n : max(1, n // _JUDGING)], :3].T.copy()
-        best, plane = -np.inf, np.zeros(3)
-        for t in range(-1, len(drawn)):  # the first is the level one
-            tried = np.zeros(3) if t < 0 else _through(sampled, near[(n * drawn[t]).astype(np.int64)])
-            if abs(tried[0]) > reach or np.hypot(tried[1], tried[2]) > steepest:
-                continue
-            score = _weight(judges, tried, clear)
-            if score > best:
-                best, plane = score, tried
+        plane, most = _with_most(judges, tried, clear)
+        if most < _LEAST * judges.shape[1]:
+            continue
+        while True:
+            judges = judges[:, _heights(judges, plane) <= -clear].copy()
+            lower, on = _with_most(judges, tried, clear)
+            if on < _UNDER * most:
+                break
+            plane, most = lower, on
         out[count, 0], out[count, 1:] = view, plane
         count += 1
     return out[:count]
 
 
 @numba.njit(cache=True, nogil=True)
-def _weight(judges: Array, plane: Array, clear: float) -> float:
-    """Return how many of the points (3, N) lie on a plane, less those under it; in whole numbers, several at once."""
-    x, y, z = judges[0], judges[1], judges[2]
-    a, b, c = plane[0], plane[1], plane[2]
-    on = under = 0
-    for i in range(len(x)):
-        height = z[i] - a - b * x[i] - c * y[i]
-        on += abs(height) < clear
-        under += height <= -clear
-    return on - _UNDER * under
+def _with_most(points: Any, planes: Any, clear: float) -> tuple[Any, int]:
+    """Return that of planes (K, 3) which most of points (3, N) lie on, and how many do."""
+    best, most = planes[0], -1
+    for plane in planes:
+        on = 0
+        for height in _heights(points, plane):
+            on += abs(height) < clear
+        if on > most:
+            best, most = plane, on
+    return best, most
+
+
+@numba.njit(cache=True, nogil=True)
+def _heights(points: Any, plane: Any) -> Any:
+    """Return how high points (3, N) lie over a plane a + b x + c y [m]."""
+    return points[2] - plane[0] - plane[1] * points[0] - plane[2] * points[1]
 
 
 @numba.njit(cache=True, nogil=True)
