@@ -163,6 +163,13 @@ def test_other_faults_and_poor_motions_are_not_called_misread(name: str) -> None
         require_well_read(made(seed=seed, **OTHERWISE[name]))
 
 
+@pytest.mark.parametrize("seed", [100, 101, 102])
+def test_a_slip_far_from_the_homes_is_not_called_poses_that_all_tell_the_other_way_round(seed: int) -> None:
+    """These fit one another as well, and move farther than poses do, so that noise is a smaller share."""
+    log = made(seed=seed, **OTHERWISE["slip"])
+    require_well_read(log.with_homes({name: Pose(Rotation.identity(), [3.0, -2.0, 0.5]) for name in log.names}))
+
+
 def test_a_robot_that_is_merely_noisy_is_not_called_misread() -> None:
     def shaken(R: Array, p: Array) -> tuple[Array, Array]:
         return R, p + np.random.default_rng(0).normal(0, 0.05, p.shape)

@@ -36,6 +36,14 @@ def test_one_file_for_two_robots_is_refused(log: TeamLog, number: int) -> None:
         identify_team(doubled)
 
 
+def test_one_file_for_two_robots_is_refused_though_torques_are_read_for_one_alone(log: TeamLog) -> None:
+    track = log.recordings[-1].tracks["robot0"]
+    torque = {"torque": np.ones((len(track), 3))}
+    twin = replace(track, channels={**track.channels, **torque})
+    with pytest.raises(BadValue, match="'robot0' and 'robot2' have the same numbers"):
+        identify_team(with_track(log, -1, "robot2", twin))
+
+
 def test_a_force_that_never_changes_in_motion_is_named(log: TeamLog) -> None:
     track = log.recordings[-1].tracks["robot1"]
     dead = Track(track.time, {**track.channels, "force": np.zeros((len(track), 3))}, track.valid, track.carrying)

@@ -9,7 +9,7 @@ import pytest
 
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, TeamScene, case
+from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
@@ -63,6 +63,19 @@ def test_what_is_usual_is_told_by_other_recordings_where_a_hand_pushes_most_of_o
     trial = simulate_team(replace(case("C"), motion_samples=3000), 3)
     starts = tuple(np.arange(0.2, 18.0, 1.2))
     found = JointTeam().identify(pushed(trial, len(trial.log.recordings) - 1, starts, 1.8, 1.5 * PUSH))
+    assert found.codes() == {"contact"}
+    assert worst(found, trial) < 4
+
+
+@pytest.mark.parametrize(("robots", "seed", "share"), [(2, 0, 0.3), (2, 1, 0.6), (3, 1, 0.3), (3, 2, 0.6)])
+def test_a_hand_is_no_sign_that_is_wrong(robots: int, seed: int, share: float) -> None:
+    """Where robots push little against one another a hand in a tenth of the log fits another sign of one better."""
+    noise = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.3, torque_white_Nm=0.02)
+    six_axis = frozenset(range(robots))
+    scene = TeamScene(noise, robots, sensing="poses", six_axis=six_axis, kinds=("motion",), motion_samples=3000)
+    trial = simulate_team(replace(scene, squeeze_N=1.0), seed)
+    force = share * 9.81 * trial.truth.body.mass * np.array([0.8, 0.3, -0.5])
+    found = JointTeam().identify(pushed(trial, 0, (12.0,), 3.0, force))
     assert found.codes() == {"contact"}
     assert worst(found, trial) < 4
 

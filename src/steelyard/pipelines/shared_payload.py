@@ -25,6 +25,7 @@ from steelyard.pipelines.lacking import missing_rows, missing_wrenches, repeated
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.lags import together
 from steelyard.team.estimate import TeamEstimate
+from steelyard.team.hung_motion import without_hung
 from steelyard.team.joint import JointTeam
 from steelyard.team.lost_wrenches import stuck_forces, without_clipped, without_frozen
 from steelyard.team.misread.files import (
@@ -61,14 +62,16 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_own_numbers(log)
     log, moving = with_moves_as_motion(log)
     log, steady = with_steady_tracks(log) if method == "joint" else (log, ())
-    log, apart = together(log) if method == "joint" else (log, NOTHING)
+    live, hung = without_hung(log)
+    apart = together(live)[1] if method == "joint" else NOTHING
+    log, live = apart.corrected(log), apart.corrected(live)
     for recording in log.recordings:
         recording.require_overlap()
-    live, frozen = without_frozen(log)
+    live, frozen = without_frozen(live)
     whole, clipped = without_clipped(live)
     found = _with_clocks(_identified(whole, method), apart, log)
     lost = (*repeated_rows(log), *missing_rows(log), *missing_wrenches(log, _weighing(log, method)))
-    seen = (*stuck_forces(log), *frozen, *clipped, *found.findings, *lost)
+    seen = (*stuck_forces(log), *hung, *frozen, *clipped, *found.findings, *lost)
     found = replace(found, findings=seen, notes=(*steady, *moving, *found.notes)).by_cause()
     return _weighed(_with_gravity(_remedied(found), log))
 

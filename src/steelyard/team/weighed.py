@@ -13,7 +13,7 @@ from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, consistent, team_size
-from steelyard.team.changes.contact import unpropped, untouched, without_odd
+from steelyard.team.changes.contact import unpropped, unpushed, untouched, without_odd
 from steelyard.team.changes.load_steps import with_one_load
 from steelyard.team.clocks.errors import ClockErrors, Errors
 from steelyard.team.estimate import TeamEstimate
@@ -112,6 +112,10 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
                 read = (*read, places.finding(log.names))
         return Weighing(groups, _summing_given(D, log.names, taken), read, taken, fit)
 
+    def as_given(rows: PayloadRows) -> Weighing:
+        groups = _groups(rows, seen.path, highest_hz, motion.ORDER)
+        return Weighing(groups, D, (), {}, again(groups))
+
     def again(some: tuple[Group, ...]) -> PayloadFit:
         return fit_payload(some, D, C, size, with_gain)
 
@@ -122,9 +126,10 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
 
     C = unit_bias(D, six_axis, size)
     standing, propped = unpropped(seen.rows, fitted, D, highest_hz)
-    rows, begun, late = with_timely_forces(standing, fitted(standing), fitted, highest_hz)
+    standing, begun, pushed = unpushed(standing, fitted(standing), as_given, fitted, size, highest_hz)
+    rows, begun, late = with_timely_forces(standing, begun, fitted, highest_hz)
     rows, alike, loaded = with_one_load(rows, begun, fitted, D, size, highest_hz)
-    first, touched = untouched(rows, alike, fitted, size, highest_hz)
+    _, first, touched = untouched(rows, alike, fitted, size, highest_hz)
     groups, read, payload = first.groups, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     plain = payload
@@ -164,6 +169,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *seen.findings,
         *propped,
         *loaded,
+        *pushed,
         *touched,
         *odd,
         *(gains(payload.gain, payload.gainless) if known and own is None else ()),

@@ -13,14 +13,17 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
 from steelyard.logs.clipping import NOISE_SHARE, clipped_rows, left_out, noise_shares, saturated, with_neighbours
+from steelyard.logs.hung import hung
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.repeated_rows import NOISY, columns_of, repeats, rising
-from steelyard.logs.runs import around, lasting, runs
+from steelyard.logs.runs import around, lasting
 from steelyard.sanity.rows.stray_poses import without_strays
 from steelyard.spatial import cross_matrix
 
 # A channel is frozen when it holds still for this long although it never else does.
 FROZEN_ROWS, FROZEN_S = 50, 0.25
+# A driver hangs so many times in a log at most.
+MOST_HUNG = 3
 # One that repeats in more than this share of some block of so many rows has a quantum too coarse to tell: the first
 # where it holds still at several values, else the second. Others stand still longer than they would by this chance.
 COARSE, CHANCE = (0.5, 0.8), 1e-3
@@ -156,24 +159,12 @@ def _hung_poses(stream: Stream) -> Mask:
 def _hung(stream: Stream, quantities: tuple[str, ...]) -> tuple[Mask, bool]:
     """Return the rows (N,) of long stretches in which nothing of these changes and that jump after; and if all jump.
 
-    None are where values repeat elsewhere, too, or stand still more than three times.
+    None are where values repeat elsewhere, too, or stand still more than a few times.
     """
-    rows = np.zeros(len(stream), bool)
     channels = {q: stream.channels[q] for q in quantities if q in stream.channels}
-    values = columns_of(replace(stream, channels=channels)) if channels else np.empty((len(stream), 0))
-    if stream.time is None or not values.shape[1]:
-        return rows, True
-    same = (values[1:] == values[:-1]).all(1)
-    long = lasting(same, _rows_needed(stream.time))
-    held = runs(long)
-    if not 1 <= len(held) <= 3 or same[~long].mean() > 0.05:
-        return rows, True
-    steps = np.abs(np.diff(values, axis=0))
-    typical = np.maximum(np.median(steps[~long], 0), 1e-300)
-    jumping = [(a, b) for a, b in held.tolist() if b < len(steps) and (steps[b] > 5 * typical).any()]
-    for first, last in jumping:
-        rows[first : last + 1] = True
-    return rows, len(jumping) == len(held)
+    if stream.time is None or not channels:
+        return np.zeros(len(stream), bool), True
+    return hung(columns_of(replace(stream, channels=channels)), _rows_needed(stream.time), MOST_HUNG)
 
 
 def _alone(values: Array, axis: int, rows: Mask) -> bool:

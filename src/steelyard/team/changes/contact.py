@@ -106,19 +106,35 @@ def _along_weight(force: Array, run: Run) -> Array:
 
 def untouched(
     rows: PayloadRows, fit: Weighing, fitted: Fitted, size: float, highest_hz: float
-) -> tuple[Weighing, tuple[Finding, ...]]:
-    """Return the fit of rows without those in which something touched the payload, and what is said of that.
+) -> tuple[PayloadRows, Weighing, tuple[Finding, ...]]:
+    """Return rows and fit without those in which something touched the payload, and what is said of that.
 
     Nothing is left out that the parameters hang on. size  of the team [m]
     """
-    rows, touched = _without_touched(rows, fit, size, highest_hz)
+    kept, touched = _without_touched(rows, fit, size, highest_hz)
     if not touched:
-        return fit, ()
+        return rows, fit, ()
     try:
-        fewer = fitted(rows)
+        fewer = fitted(kept)
     except CannotAnswer:
-        return fit, ()
-    return (fit, ()) if fewer.payload.lost.shape[1] > fit.payload.lost.shape[1] else (fewer, tuple(touched))
+        return rows, fit, ()
+    if fewer.payload.lost.shape[1] > fit.payload.lost.shape[1]:
+        return rows, fit, ()
+    return kept, fewer, tuple(touched)
+
+
+def unpushed(
+    rows: PayloadRows, fit: Weighing, as_given: Fitted, fitted: Fitted, size: float, highest_hz: float
+) -> tuple[PayloadRows, Weighing, tuple[Finding, ...]]:
+    """Return what `untouched` does where a touch alone made forces look misread: without it they are not.
+
+    as_given  the fit with forces as they are given
+    """
+    if fit.read:
+        kept, fewer, touched = untouched(rows, as_given(rows), fitted, size, highest_hz)
+        if touched and not fewer.read:
+            return kept, fewer, touched
+    return rows, fit, ()
 
 
 def _without_touched(

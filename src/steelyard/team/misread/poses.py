@@ -89,21 +89,18 @@ def _turned(right: Callable[[Array], Array | None]) -> Callable[[Pose], Pose | N
 
 METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inches": INCH}
 SCALES = tuple(_scaled(a, b, METRES[a] / METRES[b]) for a in METRES for b in METRES if a != b)
-# Lengths that all robots tell in another unit fit one another as well as before; turns do not.
-TURNS = (
-    Reading(
-        "poses are those of its home in its grasp, not of its grasp in its home",
-        "Write the inverse of each pose.",
-        Pose.inverse,
-    ),
-    *(
-        Reading(
-            m.words, m.remedy or (SWAP if m.code == "quaternion-order" else TRANSPOSE), _turned(m.right)
-        )
-        for m in MISREAD
-    ),
-)  # fmt: skip
-READINGS = (*SCALES, *TURNS)
+# Lengths that all robots tell in another unit fit one another as well as before, and so do poses that all tell the
+# other way round, whose homes then pass for grasps; rotations alone do not.
+TURNS = tuple(
+    Reading(m.words, m.remedy or (SWAP if m.code == "quaternion-order" else TRANSPOSE), _turned(m.right))
+    for m in MISREAD
+)
+INVERTED = Reading(
+    "poses are those of its home in its grasp, not of its grasp in its home",
+    "Write the inverse of each pose.",
+    Pose.inverse,
+)
+READINGS = (*SCALES, INVERTED, *TURNS)
 
 
 def require_well_read(log: TeamLog) -> None:
