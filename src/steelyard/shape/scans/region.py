@@ -80,7 +80,10 @@ def followed(scene: Scene, region: Region) -> Region:
 
 
 def _object_within(scene: Scene, reach: float, stride: int) -> Region:
-    """Return where the largest object lies, of a map that reaches so far from where the cameras look [m]."""
+    """Return where the object lies, of a map that reaches so far from where the cameras look [m].
+
+    It is the largest, each cell counted by the images that hold it: one that most images cut off is not looked at.
+    """
     pitch = 2 * scene.pixel
     half, near = int(reach / pitch), int(REACHES[0] * scene.distance / pitch)
     grid = Grid.about_origin(half, pitch)
@@ -88,7 +91,7 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     floor = 0.0 if scene.raised else -cap
     sums = images.height_map(scene.images, stride, grid.low, pitch, floor, cap, *grid.shape)
     middle = (slice(half - near, half + near),) * 2
-    well, watched = _watched(scene, grid, sums[..., 0], middle)
+    well, watched, held = _watched(scene, grid, sums[..., 0], middle)
     mean = sums[..., 1] / np.maximum(sums[..., 0], 1)
     # Beside a stand what lies lower counts as no height at all, and says nothing of how even the stand is.
     even = mean[well & (mean > 0) & (mean < 3 * scene.sigma)] if scene.raised else mean[well]
@@ -99,7 +102,7 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     area = np.bincount(label[well], minlength=found + 1)[1:]
     if not area.any():
         raise CannotAnswer(_nothing(scene, level > 0.5 * cap))
-    largest = int(np.argmax(area)) + 1
+    largest = int(np.argmax(np.bincount(label[well], held[well], found + 1)[1:])) + 1
     label = _with_its_floor(label, largest, watched & ~up)
     area, whole = (np.bincount(cells, minlength=found + 1)[1:] for cells in (label[well], label.ravel()))
     others = int((area > max(0.1 * area.max(), 25)).sum()) - 1
@@ -152,8 +155,10 @@ def heights(scene: Scene) -> tuple[Grid, Array]:
     return grid, np.where(enough, sums[..., 1] / np.maximum(sums[..., 0], 1), 0.0)
 
 
-def _watched(scene: Scene, grid: Grid, count: Array, middle: tuple[slice, slice]) -> tuple[Any, Any]:
+def _watched(scene: Scene, grid: Grid, count: Array, middle: tuple[slice, slice]) -> tuple[Any, Any, Array]:
     """Return which cells (I, J) of a grid hold pixels enough: in the middle as many as usual, all that are followed.
+
+    And how many images hold each.
 
     count  (I, J) pixels in each
 
@@ -169,7 +174,7 @@ def _watched(scene: Scene, grid: Grid, count: Array, middle: tuple[slice, slice]
     apart &= held >= scene.enough
     due = density * grid.pitch**2
     share = float(np.median(count[well] / np.maximum(due[well], 1e-9)))
-    return well, usual | (apart & (count > 0) & (count >= _WATCHED * share * due))
+    return well, usual | (apart & (count > 0) & (count >= _WATCHED * share * due)), held
 
 
 def _held(scene: Scene, grid: Grid) -> tuple[Array, Array]:

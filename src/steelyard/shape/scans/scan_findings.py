@@ -66,7 +66,8 @@ def _found(
 ) -> Iterator[Finding]:
     disagree, shift = surface.disagree, surface.shift
     if others := surface.others:
-        text = f"{others + 1} separate objects stand on the table where the cameras look; the largest was kept."
+        kept = "the largest where most cameras look was kept"
+        text = f"{others + 1} separate objects stand on the table where the cameras look; {kept}."
         yield Finding.of("several-objects", text)
     far = shift is not None and (shift > _FAR or level.off > TABLE_OFF)
     why = " " + said if (disagree > _WRONG or far) and (said := mistake()) else ""
