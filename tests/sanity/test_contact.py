@@ -257,6 +257,19 @@ def test_of_two_loads_with_a_pause_between_one_is_kept(name: str, first: float) 
     assert NoiseAware().identify(log.rows(mask)).parameters.mass == pytest.approx(mass_of(kept), rel=0.01)
 
 
+def test_of_two_changes_one_may_be_of_the_grip() -> None:
+    once, other = made("hammer", "stop_go", "low", 1), made("bottle", "stop_go", "low", 2)
+    twice = np.tile(np.arange(len(once)), 2)
+    log = replace(once.rows(twice), noise=None, time=np.append(once.time, once.time + 10))
+    body, time = scenarios.body("bottle").parameters(), log.time[:, None]
+    moved = body.in_frame(Pose(Rotation.identity(), np.array([0.04, 0.0, 0.01]))).vector - body.vector
+    second = other.rows(twice)
+    wrench = np.where(time < 8, second.wrench, second.wrench + second.predicted(moved))
+    _, (finding,) = untouched(replace(log, wrench=np.where(time < 4, log.wrench, wrench)), True)
+    assert finding.code == "load-changed"
+    assert re.match(r"At 8\.0 s the load of 0\.92\d kg was gripped elsewhere \(and at 4\.0 s ", finding.message)
+
+
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("spectrum", ["white", "2hz"])
 @pytest.mark.parametrize("level", ["none", "low", "moderate", "high"])

@@ -200,6 +200,7 @@ def test_the_larger_of_two_objects_is_kept_and_said() -> None:
     two = mesh_of(block((-0.05, 0.0), (-0.03, 0.03), (0, 0.03)), block((0.05, 0.07), (-0.01, 0.01), (0, 0.02)))
     scan = fuse(scanned(two).views)
     assert [finding.code for finding in scan.findings] == ["several-objects"]
+    assert scan.cloud.xyz[:, 0].max() < 0.005
 
 
 def test_a_larger_object_that_most_images_cut_off_is_not_the_one_that_is_looked_at() -> None:

@@ -142,12 +142,12 @@ def _one_of_two(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> L
 
     So it is where one object was put down and another picked up.
     """
-    if len(touches) != 1 or 0 < touches[0].first <= touches[0].last < len(slices.y):
+    if len(touches) != 1:
         return None
     first, last = touches[0].first, touches[0].last
-    rest, mass = slices.part(slice(first, last)), float(found.x[0])
-    if last - first < FEWEST_SLICES or last - first == len(slices.y):
+    if last - first < FEWEST_SLICES or (first == 0) == (last == len(slices.y)):
         return None
+    rest, mass = slices.part(slice(first, last)), float(found.x[0])
     inner = consensus.largest(rest)
     memory = memory_of(inner)
     others = touches_of(rest, inner, memory)
@@ -155,12 +155,14 @@ def _one_of_two(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> L
     if change is None:
         return None
     edge = last if first == 0 else first
-    masses = (change.after, mass) if first == 0 else (mass, change.before)
+    before, after = (change.after, mass) if first == 0 else (mass, change.before)
+    if min(before, after) < -SHARE * max(before, after):
+        return None
     return replace(
         change,
         time=float(slices.time[edge - 1] + slices.time[edge]) / 2,
-        before=masses[0],
-        after=masses[1],
+        before=before,
+        after=after,
         slip=0.0,
         also=f" (and at {change.time:.1f} s {change.words})",
     )

@@ -76,6 +76,8 @@ class LoadChange:
         """What happened, in words."""
         if self.slip:
             return slip_words(self.slip)
+        if abs(self.after - self.before) <= SHARE * self.before:
+            return f"the load of {self.after:.3g} kg was gripped elsewhere{self.also}"
         if self.loaded_before is None:
             return change_words(self.before, self.after) + self.also
         done = "put down or lost" if self.loaded_before else "picked up"
