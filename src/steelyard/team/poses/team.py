@@ -29,7 +29,7 @@ from steelyard.team.stacked import Stretch, stretches, with_rows
 
 # Clocks that were moved are moved until they stand still to this [s]: a step of 10 ms depends by a microsecond on who
 # is the reference, and by where noisy rows are then read the answer does in its sixth digit.
-STILL = 1e-8
+STILL = 1e-7
 # Clocks that move by less [s] leave what the rows say as it is: nobody turns a payload far in that time.
 UNCHANGED = 0.02
 # Rows that are enough to come near the optimum; all rows then finish. A row of many robots says more of the motion, so
