@@ -36,6 +36,7 @@ from steelyard.team.misread.files import (
 )
 from steelyard.team.misread.home_axes import with_grasp_axes
 from steelyard.team.published import PublishedTeam
+from steelyard.team.stray_rows import without_strays
 from steelyard.team.team_findings import late_clocks
 from steelyard.team.weighed import clocked
 
@@ -62,7 +63,8 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_own_numbers(log)
     log, moving = with_moves_as_motion(log)
     log, steady = with_steady_tracks(log) if method == "joint" else (log, ())
-    live, hung = without_hung(log)
+    live, stray = without_strays(log)
+    live, hung = without_hung(live)
     apart = together(live)[1] if method == "joint" else NOTHING
     log, live = apart.corrected(log), apart.corrected(live)
     for recording in log.recordings:
@@ -71,7 +73,7 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     whole, clipped = without_clipped(live)
     found = _with_clocks(_identified(whole, method), apart, log)
     lost = (*repeated_rows(log), *missing_rows(log), *missing_wrenches(log, _weighing(log, method)))
-    seen = (*stuck_forces(log), *hung, *frozen, *clipped, *found.findings, *lost)
+    seen = (*stuck_forces(log), *stray, *hung, *frozen, *clipped, *found.findings, *lost)
     found = replace(found, findings=seen, notes=(*steady, *moving, *found.notes)).by_cause()
     return _weighed(_with_gravity(_remedied(found), log))
 
