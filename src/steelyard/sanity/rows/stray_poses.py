@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from steelyard.check import Array, Integers
+from steelyard.check import Mask
 from steelyard.findings import Finding
+from steelyard.logs.clock import usual_step
 from steelyard.logs.recording import Stream
 from steelyard.logs.strays import strays
-from steelyard.sanity.rows.still_rows import WAY, angles
 
-# [rad] A leap, as is one by WAY. Angles that wrap and are read in the wrong unit leap by 2 pi degrees.
-TURN = float(np.radians(10))
+# Leaps of a rotation matrix (10 degrees: angles that wrap and are read in the wrong unit leap by 2 pi degrees), and of a
+# position [m].
+LEAST = {"rotation": 0.25, "position": 5e-3}
 
 
 def without_strays(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     """Return the stream without rows whose pose is away from those on both sides, which agree, and what was found."""
-    if stream.time is None or "rotation" not in stream.channels:
+    if stream.time is None or "rotation" not in stream.channels or len(stream) < 2:
         return stream, ()
-    away = strays(len(stream), partial(_apart, stream))
+    away = _away(stream, usual_step(np.diff(stream.time)))
     if not away.any():
         return stream, ()
     count = int(away.sum())
@@ -32,11 +31,7 @@ def without_strays(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     return stream.rows(~away), (Finding("outliers", text, "Nothing to do; check what tracks or logs the pose."),)
 
 
-def _apart(stream: Stream, first: Integers, second: Integers) -> Array:
-    """Return how far apart the poses of two rows each (K,) are, in leaps."""
-    R = stream.channels["rotation"]
-    apart = angles(np.swapaxes(R[first], 1, 2) @ R[second]) / TURN
-    if "position" in stream.channels:
-        place = stream.channels["position"]
-        apart = np.maximum(apart, np.linalg.norm(place[second] - place[first], axis=1) / WAY)
-    return np.asarray(apart)
+def _away(stream: Stream, step: float) -> Mask:
+    """Return which rows (N,), so long [s] apart, have a rotation or a position that is away."""
+    parts = [(stream.channels[name], least) for name, least in LEAST.items() if name in stream.channels]
+    return np.asarray(np.any([strays(part.reshape(len(stream), -1), step, least) for part, least in parts], axis=0))
