@@ -35,6 +35,8 @@ REMEDIES: dict[str, str] = {
     "outliers": "Nothing to do if knocks were expected; the rows were left out.",
     "contact": "Keep people and fixtures off the object, then record again; the touched time was left out. An arm that "
     "estimates its wrench from the torques of its joints may err as much by itself.",
+    "cable-force": "Lead cables so that they do not pull, and switch the payload compensation of controllers off; or "
+    "weigh a known mass with the team once.",
     "load-changed": "Record one run per load: cut the log where the load changed.",
     "too-few-poses": "Add still poses whose gravity directions in S differ by more than 30 degrees.",
     "nearly-planar": "Add poses that tilt gravity out of that plane, so that it visits all axes of S.",
@@ -136,7 +138,7 @@ class Finding:
 
 # What touched or changed the load while it was recorded, single rows beside that, and what the data then cannot show.
 # All else comes before these: what was read wrongly, and what of the sensor or the shape is wrong.
-_OF_THE_RUN = {"contact", "load-changed", "bias-drift", "grasp-slipped", "robot-left", "robot-joined"}
+_OF_THE_RUN = {"contact", "cable-force", "load-changed", "bias-drift", "grasp-slipped", "robot-left", "robot-joined"}
 _LEFT_OUT = {"outliers"}
 _CANNOT_SHOW = {
     "too-few-poses",

@@ -28,6 +28,8 @@ USUAL_GAIN = 0.01
 ALONG = 0.9
 # A bias that stands still in the room is worth a word from this size [N].
 HOME_BIAS = 0.03
+# From this share of the weight on it is more than the error of a sensor.
+PULLS = 0.01
 # Steps [standard deviations] that a fit may leave untaken without a word.
 UNSETTLED = 0.1
 AXES = ("x", "y", "z")
@@ -169,14 +171,18 @@ def unseen_gains(team: TeamEstimate, share: float) -> tuple[str, ...]:
     )
 
 
-def biased_at_home(size: float) -> tuple[str, ...]:
-    """Return a note where forces measured below gimbals err by a bias of `size` [N] that stands still in the room."""
+def pulled_in_room(size: float, weight: float) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
+    """Return cable-force, or a note where it is little, for forces of `size` [N] that stand still in the room.
+
+    weight  of the payload [N]
+    """
     if size < HOME_BIAS:
-        return ()
-    return (
-        f"Forces of robots with passive gimbals err by about {size:.1g} N in the axes of their homes, as springs of a "
-        "Delta do: such a bias looks like weight. It is fitted, and bars allow for it.",
-    )
+        return (), ()
+    what = f"Forces of about {size:.1g} N stand still in the axes of the robots' homes: they look like weight"
+    if size < PULLS * weight:
+        return (), (f"{what}, as errors of a Delta's springs do. They are fitted, and bars allow for them.",)
+    why = "as where a cable pulls, or a controller takes away what it believes its arm bears"
+    return (Finding.of("cable-force", f"{what}, {why}. They were fitted and taken out, and bars allow for them."),), ()
 
 
 def uncalibrated(recurring: Array | None) -> tuple[str, ...]:

@@ -29,17 +29,17 @@ from steelyard.team.payload.doubt import weight_by_gains
 from steelyard.team.payload.fit import PayloadFit, Weighing, fit_payload
 from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.late_forces import with_timely_forces
-from steelyard.team.payload.model import Group, unit_bias, units_of_body
+from steelyard.team.payload.model import Group, unit_bias, units_of_body, weight
 from steelyard.team.payload.spectra import band_edges, gathered, motion_noise
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.yielding import Yields
 from steelyard.team.team_findings import (
     bad_robots,
-    biased_at_home,
     gains,
     late_clocks,
     lost_directions,
     open_parameters,
+    pulled_in_room,
     uncalibrated,
     unseen_gains,
     unsettled,
@@ -105,7 +105,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         fit = again(groups)
         if known and (taken or not read):  # forces that are misread, and left so, tell no places
             moved_groups, moved_fit, places = with_moments_at_grasps(groups, fit, again, D, C, six_axis)
-            if places is not None and not rather_a_gain(groups, fit):
+            if places is not None and not rather_a_gain(groups, fit) and not pulled(moved_fit):
                 groups, fit = moved_groups, moved_fit
                 moved = places.taken(log.names)
                 taken = {**taken, **{name: M @ taken.get(name, np.eye(6)) for name, M in moved.items()}}
@@ -124,6 +124,10 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         one = own_gain(groups, fit, again, D)
         return one is not None and with_moments_at_grasps(one.groups, one.fit, again, D, C, six_axis)[2] is None
 
+    def pulled(fit: PayloadFit) -> bool:
+        """Return whether something pulls that stands still in the room: moments that it makes pass for misplaced."""
+        return with_home_bias(fit, D, C, placed.position, six_axis, with_gain)[1] > 0
+
     C = unit_bias(D, six_axis, size)
     standing, propped = unpropped(seen.rows, fitted, D, highest_hz)
     standing, begun, pushed = unpushed(standing, fitted(standing), as_given, fitted, size, highest_hz)
@@ -133,7 +137,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     groups, read, payload = first.groups, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     plain = payload
-    payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
+    payload, home_bias = with_home_bias(payload, D, C, placed.position, six_axis, with_gain)
     _require_one_clock(payload.chi2)
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
         _require_mass(payload)
@@ -159,6 +163,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         assembled(log, grasps, spread, payload, D, against(motion.late, log.reference)), wrists, size
     )
     team = clocked(team, seen.begun.first(log))
+    pulls, little = pulled_in_room(home_bias, weight(payload.parameters))
     # Who errs, when, and what was read wrongly comes before what is seen of grasps, and that before what does not fit.
     found = (
         *bad_robots(log.names, motion.fit.noise),
@@ -172,13 +177,14 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *pushed,
         *touched,
         *odd,
+        *pulls,
         *(gains(payload.gain, payload.gainless) if known and own is None else ()),
         *wrong,
         *(() if own is None else (own.finding(log.names),)),
         *lost_directions(team.grasps, seen.down, motion.apart),
         *open_parameters(team.identified, team.evidence.rank),
     )
-    said = (*unsettled(motion.fit.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
+    said = (*unsettled(motion.fit.left), *little, *unseen_gains(team, weight_by_gains(groups, D)))
     said = said if motion.ORDER == 1 else (*said, *uncalibrated(seen.spread.recurring))
     return replace(team, findings=found, notes=(*team.notes, *said), wrench_maps=first.taken)
 

@@ -10,7 +10,7 @@ from steelyard.logs.clock import usual_step
 from steelyard.logs.recording import Stream
 from steelyard.logs.strays import strays
 
-# Leaps of a rotation matrix (10 degrees: angles that wrap and are read in the wrong unit leap by 2 pi degrees), and of a
+# Leaps of a rotation matrix (10 degrees: angles that wrap, read in the wrong unit, leap by 2 pi degrees), and of a
 # position [m].
 LEAST = {"rotation": 0.25, "position": 5e-3}
 

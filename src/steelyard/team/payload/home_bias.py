@@ -1,13 +1,15 @@
-"""A bias that keeps its direction in the room: that of forces which a robot measures below its gimbal.
+"""A force that keeps its direction in the room: a bias that a robot measures below its gimbal, a cable's steady pull.
 
-Springs of a Delta, and sensors under a gimbal, err by a force that is constant in the robot's home, not in its grasp.
-Robot i errs by beta_i ~ N(0, b^2) along the axes e_k of the room, which are c_k(t) in B and turn as the payload does:
+Springs of a Delta, and sensors under a gimbal, err by a force that is constant in the robot's home, not in its grasp;
+so does a controller that takes away what it believes its arm bears, and a cable pulls the payload so. Robot i errs by
+beta_i ~ N(0, b^2) along the axes e_k of the room, which are c_k(t) in B and turn as the payload does:
 
     sum_i [p_i x c_k; c_k] beta_ik = sum_j u_jk [q_j x c_k; s_j c_k]
 
-with [s_j; q_j] (4,) the directions that the columns [1; p_i] span, so that u is up to twelve numbers (four where only
-up is known). What points up is weight without inertia: still poses cannot tell it from mass, motion can. The u are
-fitted beside the ten parameters; how large b is, and whether there is any, is averaged by evidence.
+with [s_j; q_j] (4,) the directions that the columns [1; p_i] span, and [0; l] beside where wrists measure moments: the
+weight that is taken away may lie off the grasp. So u is up to twelve numbers (four where only up is known). What points
+up is weight without inertia: still poses cannot tell it from mass, motion can. The u are fitted beside the ten
+parameters; how large b is, and whether there is any, is averaged by evidence.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.spatial import cross_matrix
 from steelyard.team.payload.bias_models import Models, ladder_of, shares
 from steelyard.team.payload.fit import PayloadFit
@@ -25,11 +27,15 @@ from steelyard.team.payload.model import Normal
 from steelyard.team.stacked import row_slices
 
 # [N] the sizes that are tried; none at all is beforehand so many times as likely as any of them.
-SIZES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
+SIZES = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])
 NONE = 100.0
 # Those that are asked first, and the share from which such a bias counts.
-ASKED = SIZES[:4:2]
+ASKED = SIZES[1::2]
 COUNTS = 0.01
+# u is told in so many times its size: what is known of it beforehand is then no direction that is lost.
+UNIT = 4.0
+# [m] how far off a six-axis wrist the weight lies that is taken away.
+OFF = 0.2
 # From this share of none at all on it is not said that there is one.
 DOUBTED = 0.5
 # Gains with less than this share are not tried beside such a bias.
@@ -87,27 +93,28 @@ class _Tried:
 
 
 def with_home_bias(
-    fit: PayloadFit, D: Array, C: Array, places: Array, with_gain: bool = True
+    fit: PayloadFit, D: Array, C: Array, places: Array, six_axis: Mask, with_gain: bool = True
 ) -> tuple[PayloadFit, float]:
     """Return the fit with biases that keep their direction in the room allowed for, and how large they are [N].
 
     That is zero where there may be none.
 
-    places  (G, 3) [m] in B of the grasps on gimbals; without any the fit stays as it is. D, C as in `fit_payload`
+    places  (N, 3) [m] in B of the grasps     six_axis  (N,) whose moments are measured     D, C as in `fit_payload`
 
     Noise and its weights are kept: such a bias hardly changes within a recording.
     """
-    if not len(places):
-        return fit, 0.0
-    levers, plain = home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3), fit.normals
-    each = zip(fit.groups, fit.weights, strict=True)
+    levers = home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3, OFF * six_axis.any())
+    plain, each = fit.normals, zip(fit.groups, fit.weights, strict=True)
     wide = [one for group, weights in each for one in group.normals(D, weights, levers)]
-    scale = np.concatenate([fit.scale, np.ones(len(levers))])
+
+    def of(size: float, ladder: Array) -> Models:
+        scale = np.concatenate([fit.scale, np.full(len(levers), UNIT * size)])
+        return Models.of(_held(wide, size), C, ladder, scale)
 
     def tried(ladder: Array, sizes: Array) -> _Tried:
         none = Models.of(plain, C, ladder, fit.scale)
-        beside = [Models.of(_held(wide, size), C, ladder, scale) for size in sizes]
-        chance = [one.evidence - len(levers) * np.log(size) for one, size in zip(beside, sizes, strict=True)]
+        beside = [of(size, ladder) for size in sizes]
+        chance = [one.evidence + len(levers) * np.log(UNIT) for one in beside]
         return _Tried([none, *beside], shares(np.array([none.evidence + np.log(NONE), *chance])), sizes)
 
     # Without gains first, at a tenth of the cost: where no such bias shows, none does with them.
@@ -120,12 +127,15 @@ def with_home_bias(
     return fit, 0.0
 
 
-def home_levers(places: Array, axes: int) -> Array:
+def home_levers(places: Array, axes: int, off: float = 0.0) -> Array:
     """Return the wrench E (U, 6, 3 axes) at B that each unit of u makes of what stands still in the room.
 
-    places  (G, 3) [m] of the grasps in B     axes  how many of the room's axes are known: 3, or 1 where only up is
+    places  (N, 3) [m] of the grasps in B     axes  how many of the room's axes are known: 3, or 1 where only up is
+    off     [m] how far off a grasp a force may act
     """
-    spans, length, _ = np.linalg.svd(np.concatenate([np.ones((1, len(places))), places.T]), full_matrices=False)
+    spread = np.concatenate([np.ones((1, len(places))), places.T])
+    spread = np.concatenate([spread, off * np.eye(4)[:, 1:]], axis=1) if off else spread
+    spans, length, _ = np.linalg.svd(spread, full_matrices=False)
     columns = (spans * length)[:, length > SPANNED * length[0]].T
     out = np.zeros((axes, len(columns), 6, axes, 3))
     for k in range(axes):
