@@ -6,7 +6,9 @@ import json
 from collections.abc import Mapping, Sequence
 
 # Left open: a number that nobody looked up would be taken as exact, and the bars would not hold the place.
-GRAVITY_LINE = "# gravity = [0, 0, -9.81]    # that of your place, in the world frame W, m/s^2; else bars hold 0.15 % for it"
+GRAVITY_LINE = (
+    "# gravity = [0, 0, -9.81]    # that of your place, in the world frame W, m/s^2; else bars hold 0.15 % for it"
+)
 
 HEAD = f"""\
 [log]
