@@ -15,7 +15,7 @@ from steelyard.findings import Finding
 from steelyard.logs.two_states import cheapest_path
 from steelyard.spatial import Rotation
 
-# Half a turn [rad], but for rounding: no rotation vector is longer, no roll or yaw beyond. One that is costs so many leaps.
+# Half a turn [rad], but for rounding: no rotation vector is longer, no roll or yaw. One that is costs so many leaps.
 LONGEST, TOO_LONG = np.pi + 0.01, 3.0
 # A leap between rows is so many times the step [rad] that few exceed, and so much beyond.
 LEAP, LEAST_LEAP = 5.0, np.radians(1.0)
