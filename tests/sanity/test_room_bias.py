@@ -139,7 +139,7 @@ def test_residuals_are_those_without_it() -> None:
 
 def test_it_is_found_within_its_bars_and_the_rows_are_put_right() -> None:
     at = hammer.motion().at(np.arange(3000) / 100)
-    exact = exact_log(at, hammer.body(), DOWN, (0.05, 0.1))
+    exact = exact_log(at, hammer.body(), DOWN, (0.001, 0.001))  # rows that move slowly are not at rest
     noise = np.random.default_rng(0).normal(size=(3000, 6)) * np.repeat([0.002, 0.05], 3)
     log = replace(exact, wrench=exact.wrench + noise)
     turns = at.rotation.matrix

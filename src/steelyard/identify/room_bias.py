@@ -28,8 +28,9 @@ from steelyard.logs.log import MotionLog
 SIZES, ARM = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0), 0.1
 # What acceleration says of a mass may be off by this share: of filters, delays, and arms that bend.
 OF_ACCELERATION = 0.02
-# Noise, and with it what is told, is judged anew without the bias found.
-ROUNDS = 3
+# Noise, and with it what is told, is judged anew without the bias found: so often, or until that is nearer to the one
+# before than this share of what it may be off by.
+ROUNDS, STANDS = 16, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,10 @@ class RoomBias:
 
     mean: Array
     covariance: Array
+
+    def stands_beside(self, before: RoomBias) -> bool:
+        """Whether it is the same as the one that was found before, for what either may be off by."""
+        return bool((np.abs(self.mean - before.mean) < STANDS * np.sqrt(np.diag(self.covariance))).all())
 
     def errors(self) -> Array:
         """Return what it may be off by (k, 6): one standard deviation along each of its axes that may be off at all."""
@@ -58,12 +63,16 @@ def room_bias(log: MotionLog, rotation: Array, gravity: Array, bias: Bias) -> Ro
     rotation  (N, 3, 3) S to W at the rows     gravity  (3,) [m/s^2] in W     bias  that of the sensor
     """
     weight = np.concatenate([np.zeros(3), OF_ACCELERATION * gravity])
-    found = RoomBias(np.zeros(6), np.zeros((6, 6)))
+    found = before = RoomBias(np.zeros(6), np.zeros((6, 6)))
     for _ in range(ROUNDS):
         left, problem = prepared(without(found.mean, log, rotation), bias)
         solution = NoiseAware(bias=bias).solution(problem)
-        found = _drawn(*_told(left, problem.with_room(left, rotation), solution, found.mean, weight))
-    return found
+        before = found
+        found = _drawn(*_told(left, problem.with_room(left, rotation), solution, before.mean, weight))
+        if found.stands_beside(before):
+            return found
+    step = found.mean - before.mean
+    return replace(found, covariance=found.covariance + np.outer(step, step))
 
 
 def _told(log: MotionLog, problem: Problem, solution: Solution, taken: Array, weight: Array) -> tuple[Array, Array]:
