@@ -134,7 +134,7 @@ EVERYTHING = """A thing
   method     noise-aware, rank 7, 100 rows of which 20 at rest
   residual   0.01 N, 0.002 N m rms; chi² per degree of freedom 0.98
   left out   0.011 N, 0.0022 N m rms when predicted unseen
-  bias       force (4.00, 5.00, 6.00) N, torque (1.00, -2.00, 3.00) N m (subtract from the raw channels)
+  bias       force (4.00, 5.00, 6.00) N, torque (1.00, -2.00, 3.00) N m (subtract from the wrench as logged, in S)
   delay      -6.30 ms  a.csv
   note       a note
 

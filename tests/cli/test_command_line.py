@@ -649,3 +649,16 @@ def test_bench_identify() -> None:
 def test_bench_refuses_names_it_does_not_know() -> None:
     text = steelyard("bench", "identify", "--objects", "spoon", "--million", 0).failed(2)
     assert "'spoon'" in text
+
+
+def test_an_answer_is_exported(answer: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text(json.dumps(answer))
+    run = steelyard("export", tmp_path / "result.json", "--to", "ur", "--pose-of-sensor", "{ position = [0, 0, 0.1] }")
+    assert (run.status, run.err) == (0, "")
+    assert f"{answer['com_m'][2] + 0.1:.9g}]" in run.out
+    known = answer["identified"] | {"inertia": [False] * 6}
+    (tmp_path / "result.json").write_text(json.dumps(answer | {"identified": known, "inertia_com_kgm2": None}))
+    run = steelyard("export", tmp_path / "result.json", "--to", "urdf", "--guess")
+    assert run.status == 0
+    assert "<inertial>" in run.out
+    assert "best guess" in run.err

@@ -231,6 +231,10 @@ WRONG: list[tuple[dict[str, Any], str]] = [
         'recording: "gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got [0, 0, -9810].',
     ),
     ({"wrench": "sensor"}, 'recording: wrench must be "on-object" or "on-sensor"; got \'sensor\'.'),
+    (
+        {"wrench": np.zeros((N, 6))},
+        'recording: wrench must be "on-object" or "on-sensor"; got ndarray (numbers are force= and torque=).',
+    ),
     ({"noise": 0.1}, 'recording: noise must be a dict, such as {"force": 0.05}; got 0.1.'),
     (
         {"noise": {"forces": 0.1}},

@@ -407,7 +407,7 @@ STREAM = 'log.toml, [[stream]] 1 ("run")'
 TOPICS = "Topics here: /ft (20 WrenchStamped), /pose (20 PoseStamped)."
 EXAMPLE = """\
 [log]
-gravity = [0, 0, -9.81]      # in the world frame W, m/s^2
+# gravity = [0, 0, -9.81]    # that of your place, in the world frame W, m/s^2; else bars hold 0.15 % for it
 wrench  = "on-sensor"        # or "on-object": what the robot applies to the object
 
 [[stream]]

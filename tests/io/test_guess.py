@@ -201,6 +201,11 @@ def test_npz_with_usual_arrays(tmp_path: Path) -> None:
     [
         ("a b c", "no force and no torque was recognised. Columns here: a, b, c."),
         ("fx fy fz tx ty tz", "nothing says where gravity points in the sensor frame. Columns here: fx, fy, fz, tx, ty, tz."),
+        (
+            "tau1 tau2 tau3 tau4 tau5 tau6 tau7",
+            'no force and no torque was recognised, and torques of joints ("tau1" .. "tau7") are not read: log the '
+            "wrench of a sensor, or the one that the controller estimates from them. Columns here: tau1, tau2, tau3, tau4, tau5, tau6, tau7.",
+        ),
         ("fx fy fz qw qx qy qz", "no torque was recognised. Columns here: fx, fy, fz, qw, qx, qy, qz."),
         ("fx FX", 'two columns are called "fx". Columns here: fx, FX.'),
         ("1 2", "the file has no header. It has 2 columns."),
@@ -367,6 +372,8 @@ def test_pendant_lines_that_are_wrong(line: str, text: str) -> None:
     [
         (["roll", "pitch", "yaw"], 'form = "rpy", unit = "deg"'),
         (["Roll [deg]", "Pitch [deg]", "Yaw [deg]"], 'form = "rpy", unit = "deg"'),
+        (["roll_deg", "pitch_deg", "yaw_deg"], 'form = "rpy", unit = "deg"'),
+        (["roll_rad", "pitch_rad", "yaw_rad"], 'form = "rpy", unit = "rad"'),
         (["pose.roll", "pose.pitch", "pose.yaw"], 'form = "rpy", unit = "deg"'),
         (["rx", "ry", "rz"], 'form = "rotation-vector", unit = "rad"'),
         (["Rx", "Ry", "Rz"], 'form = "rotation-vector", unit = "rad"'),

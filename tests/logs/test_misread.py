@@ -34,3 +34,17 @@ def test_a_table_without_rows_or_with_one_is_read_too() -> None:
         back = VECTOR.right(Rotation.from_rpy(meant.log()).matrix)
         assert back is not None
         assert back.shape == (rows, 3, 3)
+
+
+(ANGLES,) = (m for m in MISREAD if "are roll, pitch, yaw, not a rotation vector" in m.words)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_angles_that_were_read_as_a_vector_come_back_in_all_rows(seed: int) -> None:
+    meant = swaying(seed, 2000)
+    angles = meant.rpy()
+    back = ANGLES.right(Rotation.exp(angles).matrix)
+    assert back is not None
+    off = np.abs(back - meant.matrix).max((1, 2)) > 1e-5
+    assert np.linalg.norm(angles, axis=1).max() > np.pi  # longer than a rotation vector is
+    assert off.mean() < 0.02

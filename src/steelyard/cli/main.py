@@ -27,6 +27,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "segment": ("steelyard.cli.segment:segment", "Cloud or views -> closed volume in homogeneous parts."),
     "compare": ("steelyard.cli.compare:compare", "Two results: the same object or not, with a p-value."),
     "report": ("steelyard.cli.report:report", "Result -> one page: numbers, the parts in 3D, residuals, findings."),
+    "export": ("steelyard.cli.export:export", "Result -> URDF, SDF, MuJoCo, Drake, UR, Franka."),
     "demo": ("steelyard.cli.demo:demo", "Made data, the answer, the truth: a scanned hammer, or a team of three."),
     "doctor": (
         "steelyard.cli.doctor:doctor",

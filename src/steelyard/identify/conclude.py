@@ -17,7 +17,7 @@ from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.linear import fitted, inverse_scaled, nonnegative, normal_equations, without_bias
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import ADD_POSES, Problem
-from steelyard.identify.sight import Sight
+from steelyard.identify.sight import INERTIA_SHARE, Sight
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.people import ENTRIES
@@ -147,7 +147,7 @@ def _findings(estimate: Estimate) -> tuple[Finding, ...]:
         return ()
     half_trace = float(np.trace(estimate.parameters.inertia_com)) / 2
     share = 50 * float(np.min(spread[4:][lost])) / max(half_trace, 1e-12)
-    least = f"one standard deviation is at least {share:.0f} % of half its trace"
+    least = f"one standard deviation is at least {share:.0f} % of half its trace ({100 * INERTIA_SHARE:.0f} % would do)"
     least = least if share < 1e3 else "the rows that were fitted show next to nothing of it"
     text = f"The data do not fix the inertia entries {', '.join(ENTRIES[lost])}: {least}."
     return (Finding.of("inertia-not-identified", text),)

@@ -22,7 +22,7 @@ class Estimate:
     """Parameters (10,) about the origin of `frame`, with covariance (10, 10) and everything said about them.
 
     identified   (10,) of mass, com x y z, inertia about the CoM xx xy xz yy yz zz
-    wrench_bias  (6,) [tau, f] in the recording's own sign and axes: what to subtract from the raw channels
+    wrench_bias  (6,) [tau, f] in the recording's own sign and in S: what to subtract from the wrench, once that is in S
     bias_covariance  (6, 6) of the same
     parts        mass of every part, where the object was given in parts; part_covariance (P, P) of them
     cross_covariance  (10, 6) of the parameters with the bias: needed where two runs share one bias

@@ -26,10 +26,13 @@ from steelyard.logs.log import MotionLog
 
 # [N] the sizes that are tried, alike beforehand; for torques at this arm [m].
 SIZES, ARM = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0), 0.1
+# Torques of so many times the size of the forces across gravity are those of a weight.
+UNLIKE = 5.0
 # What acceleration says of a mass may be off by this share: of filters, delays, and arms that bend.
 OF_ACCELERATION = 0.02
-# Noise, and with it what is told, is judged anew without the bias found.
-ROUNDS = 3
+# Noise, and with it what is told, is judged anew without the bias found: so often, or until that is nearer to the one
+# before than this share of what it may be off by.
+ROUNDS, STANDS = 16, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +41,10 @@ class RoomBias:
 
     mean: Array
     covariance: Array
+
+    def stands_beside(self, before: RoomBias) -> bool:
+        """Whether it is the same as the one that was found before, for what either may be off by."""
+        return bool((np.abs(self.mean - before.mean) < STANDS * np.sqrt(np.diag(self.covariance))).all())
 
     def errors(self) -> Array:
         """Return what it may be off by (k, 6): one standard deviation along each of its axes that may be off at all."""
@@ -58,12 +65,16 @@ def room_bias(log: MotionLog, rotation: Array, gravity: Array, bias: Bias) -> Ro
     rotation  (N, 3, 3) S to W at the rows     gravity  (3,) [m/s^2] in W     bias  that of the sensor
     """
     weight = np.concatenate([np.zeros(3), OF_ACCELERATION * gravity])
-    found = RoomBias(np.zeros(6), np.zeros((6, 6)))
+    found = before = RoomBias(np.zeros(6), np.zeros((6, 6)))
     for _ in range(ROUNDS):
         left, problem = prepared(without(found.mean, log, rotation), bias)
         solution = NoiseAware(bias=bias).solution(problem)
-        found = _drawn(*_told(left, problem.with_room(left, rotation), solution, found.mean, weight))
-    return found
+        before = found
+        found = _drawn(*_told(left, problem.with_room(left, rotation), solution, before.mean, weight), gravity)
+        if found.stands_beside(before):
+            return found
+    step = found.mean - before.mean
+    return replace(found, covariance=found.covariance + np.outer(step, step))
 
 
 def _told(log: MotionLog, problem: Problem, solution: Solution, taken: Array, weight: Array) -> tuple[Array, Array]:
@@ -88,12 +99,20 @@ def _told(log: MotionLog, problem: Problem, solution: Solution, taken: Array, we
     return heard @ F, heard @ (F @ taken - gradient[own:] / 2)
 
 
-def _drawn(F: Array, g: Array) -> RoomBias:
-    """Return the bias that information F (6, 6) and right side g (6,) tell, averaged over the sizes it may be drawn."""
-    torque, force = (axis.ravel() for axis in np.meshgrid(np.array(SIZES) * ARM, SIZES, indexing="ij"))
-    S = np.repeat(np.stack([torque, force], 1), 3, axis=1)
+def _drawn(F: Array, g: Array, gravity: Array) -> RoomBias:
+    """Return the bias that information F (6, 6) and right side g (6,) tell, averaged over the sizes it may be drawn.
+
+    gravity  (3,) in W: a force along it is drawn as large as torques are where these are far larger than other forces,
+             since a wrench that was zeroed with the load in hand has no others
+    """
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = turn[3:, 3:] = np.linalg.svd(gravity[None])[2]  # gravity's direction is its first row
+    F, g = turn @ F @ turn.T, turn @ g
+    torque, force = (axis.ravel() for axis in np.meshgrid(SIZES, SIZES, indexing="ij"))
+    S = np.stack([*[ARM * torque] * 3, np.where(torque > UNLIKE * force, torque, force), force, force], 1)
     A = np.eye(6) + S[:, :, None] * F * S[:, None, :]
     covariance = S[:, :, None] * np.linalg.inv(A) * S[:, None, :]
     means = covariance @ g
     chance = (means @ g - np.linalg.slogdet(A)[1]) / 2
-    return RoomBias(*mixture(softmax(chance), means, covariance))
+    mean, spread = mixture(softmax(chance), means, covariance)
+    return RoomBias(turn.T @ mean, turn.T @ spread @ turn)

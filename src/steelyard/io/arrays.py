@@ -132,8 +132,9 @@ def _description(
     specs: tuple[StreamSpec, ...], gravity: ArrayLike | None, wrench: str, noise: Mapping[str, float] | None, name: str
 ) -> Description:
     """Return what a file would say beside its columns; raises BadInput."""
-    if wrench not in SIGNS:
-        raise BadValue(f'{name}: wrench must be "on-object" or "on-sensor"; got {wrench!r}.')
+    if not isinstance(wrench, str) or wrench not in SIGNS:
+        got = repr(wrench) if isinstance(wrench, str) else f"{type(wrench).__name__} (numbers are force= and torque=)"
+        raise BadValue(f'{name}: wrench must be "on-object" or "on-sensor"; got {got}.')
     if noise is not None and not isinstance(noise, Mapping):
         raise BadValue(f'{name}: noise must be a dict, such as {{"force": 0.05}}; got {noise!r}.')
     told = gravity is not None or measures_gravity(specs)

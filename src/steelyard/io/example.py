@@ -5,9 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 
-HEAD = """\
+# Left open: a number that nobody looked up would be taken as exact, and the bars would not hold the place.
+GRAVITY_LINE = (
+    "# gravity = [0, 0, -9.81]    # that of your place, in the world frame W, m/s^2; else bars hold 0.15 % for it"
+)
+
+HEAD = f"""\
 [log]
-gravity = [0, 0, -9.81]      # in the world frame W, m/s^2
+{GRAVITY_LINE}
 wrench  = "on-sensor"        # or "on-object": what the robot applies to the object
 
 [[stream]]

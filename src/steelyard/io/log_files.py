@@ -9,7 +9,7 @@ from pathlib import Path
 from steelyard import check
 from steelyard.errors import BadDescription, BadValue, NoDescription
 from steelyard.io.contents import load_toml, readable
-from steelyard.io.example import columns_text, lines_of, toml_string
+from steelyard.io.example import GRAVITY_LINE, columns_text, lines_of, toml_string
 from steelyard.io.recordings import guess
 from steelyard.io.recordings.arm_joints import arm_of, posed, with_joints_in_order
 from steelyard.io.recordings.description import Description, parse_description
@@ -55,7 +55,7 @@ def _text(description: Description, table: Table) -> str:
     """Return the TOML text of what `guess.describe` found in a table; it reads as the table does without it."""
     gravity = f"gravity = [0, 0, {description.gravity[2]:.12g}]      # in the world frame W, m/s^2"
     if description.gravity_std:
-        gravity = "# gravity = [0, 0, -9.81]    # that of your place, in the world frame W, m/s^2"
+        gravity = GRAVITY_LINE
     log = f'[log]\n{gravity}\nwrench  = "on-object"        # or "on-sensor": what the object does to the sensor\n'
     return "\n[[stream]]\n".join([log, *(lines_of(_lines(spec, table)) for spec in description.streams)])
 

@@ -57,8 +57,8 @@ _LOOSE = re.compile("[fs]")
 _EARTH = (9.76, 9.84)
 # A unit in brackets behind a name; a number there is an index.
 _IN_BRACKETS = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
-_AXES = frozenset("xyz")
-# What stands behind an axis for a unit, the longest first: Fx_N, tau_z_Nm, tau_z_N_m, pos_x_mm, acc_y_m_s2.
+_AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+# What stands behind an axis for a unit, the longest first: Fx_N, tau_z_Nm, tau_z_N_m, pos_x_mm, acc_y_m_s2, roll_deg.
 _BEHIND_AXIS = {
     f"_{unit.replace('*', joint).replace('/', '_').replace('^', '')}": unit
     for unit in sorted({unit for units in UNITS.values() for unit in units} - {"1"}, key=len, reverse=True)
@@ -89,7 +89,7 @@ def apart(name: str) -> tuple[str, str]:
     if found := _IN_BRACKETS.search(name):
         return name[: found.start()], found.group(1)
     for ending, unit in _BEHIND_AXIS.items():
-        if name.endswith(ending) and name.removesuffix(ending)[-1:].lower() in _AXES:
+        if name.endswith(ending) and name.removesuffix(ending).lower().endswith(_AXES):
             return name.removesuffix(ending), unit
     return name, ""
 

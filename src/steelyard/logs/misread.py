@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array, Integers
+from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
 from steelyard.logs.two_states import cheapest_path
 from steelyard.spatial import Rotation
 
-# Rotation vectors are no longer than the first [rad], but for rounding; one that is costs as much as so many leaps.
+# Half a turn [rad], but for rounding: no rotation vector is longer, no roll or yaw. One that is costs so many leaps.
 LONGEST, TOO_LONG = np.pi + 0.01, 3.0
 # A leap between rows is so many times the step [rad] that few exceed, and so much beyond.
 LEAP, LEAST_LEAP = 5.0, np.radians(1.0)
@@ -72,13 +72,30 @@ def _vector(rotation: Array) -> Array:
     far = near - np.copysign(np.pi, near)
     far[:, 1] = np.copysign(np.pi, near[:, 1]) - near[:, 1]
     vectors = np.stack([near, far], 1)
-    meant = Rotation.exp(vectors).matrix
-    return np.asarray(meant[np.arange(len(meant)), _smoothest(meant, _cost(np.linalg.norm(vectors, axis=2)))])
+    length = np.linalg.norm(vectors, axis=2)
+    return _likelier(Rotation.exp(vectors).matrix, length, length > LONGEST)
 
 
-def _cost(length: Array) -> Array:
-    """Return what rotation vectors of such lengths (N, 2) [rad] cost, in leaps: those of all rows are below one."""
-    return np.asarray(TOO_LONG * (length > LONGEST) + 0.1 * length / (np.pi * max(len(length), 1)))
+def _rpy(rotation: Array) -> Array:
+    """Undo roll, pitch, yaw read as a rotation vector: three angles may be longer than half a turn, a pitch no quarter.
+
+    Beyond half a turn the vector of a matrix is the other way round, and what it lacks of a whole turn longer.
+    """
+    near = Rotation.nearest(rotation).log()
+    length = np.linalg.norm(near, axis=1, keepdims=True)
+    far = near - 2 * np.pi * near / np.maximum(length, np.finfo(np.float64).tiny)
+    angles = np.stack([near, far], 1)
+    beyond = (np.abs(angles) > [LONGEST, LONGEST - np.pi / 2, LONGEST]).any(2)
+    return _likelier(Rotation.from_rpy(angles).matrix, np.linalg.norm(angles, axis=2), beyond)
+
+
+def _likelier(meant: Array, length: Array, beyond: Mask) -> Array:
+    """Return of two rotations of each row (N, 2, 3, 3) the likelier: rows leap little, and few numbers are `beyond`.
+
+    length  (N, 2) [rad] of the numbers that each is written in: what they cost of all rows together is below a leap
+    """
+    cost = TOO_LONG * beyond + 0.1 * length / (np.pi * max(len(length), 1))
+    return np.asarray(meant[np.arange(len(meant)), _smoothest(meant, cost)])
 
 
 def _smoothest(rotation: Array, cost: Array) -> Integers:
@@ -137,6 +154,12 @@ MISREAD = (
         "the three numbers of the rotation are a rotation vector, not roll, pitch, yaw",
         'Set form = "rotation-vector" in the rotation of this stream.',
         _vector,
+    ),
+    Misread(
+        "gravity-frame",
+        "the three numbers of the rotation are roll, pitch, yaw, not a rotation vector",
+        'Set form = "rpy" in the rotation of this stream.',
+        _rpy,
     ),
     Misread(
         "gravity-frame",

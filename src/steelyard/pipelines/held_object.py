@@ -20,7 +20,16 @@ from steelyard.parts.parts import Parts
 from steelyard.pipelines.load import Load, looked_at, placed
 from steelyard.pipelines.looking_back import corrections_allowed, looked_back, of_sensor_and_body, pull_allowed
 from steelyard.pipelines.options import DEFAULTS, DRIFT_ALLOWED, Options
-from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, sign_found, told, uncalibrated
+from steelyard.pipelines.telling import (
+    Noticed,
+    beside,
+    noticed_before,
+    of_a_controller,
+    remedied,
+    sign_found,
+    told,
+    uncalibrated,
+)
 from steelyard.pipelines.told_by_rows import rows_as_given
 from steelyard.sanity.before import examine
 from steelyard.spatial import Pose
@@ -71,7 +80,8 @@ def identify(
     delays_s = {name: late + moved.get(name, 0.0) for name, late in rows.aligned.delays_s.items()}
     estimate = replace(remedied(estimate, rows), delays_s=delays_s).with_findings(*of_tool).by_cause()
     aligning = () if rows.unmeasured else rows.aligned.notes
-    return _with_bias_as(estimate.noted(*recording.notes, *of_sign, *aligning, *uncalibrated(estimate)), recording)
+    late_notes = (*of_a_controller(estimate, rows, recording), *uncalibrated(estimate))
+    return _with_bias_as(estimate.noted(*recording.notes, *of_sign, *aligning, *late_notes), recording)
 
 
 def _of_tool(tool: Recording, options: Options) -> Estimate:

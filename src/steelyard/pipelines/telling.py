@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import AT_REST, BARE, REMEDIES, UNEXPLAINED, UNMEASURED, Finding, other_than
@@ -17,6 +19,7 @@ from steelyard.parts.parts import Parts
 from steelyard.pipelines.load import WITH_BIAS, Load
 from steelyard.pipelines.rows import FitRows
 from steelyard.sanity.coverage import coverage
+from steelyard.sanity.fitted.load_motion import least_shown
 
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
@@ -36,6 +39,9 @@ OF_BIAS = {"nearly-planar"}
 SMALL_BARS = (0.002, 1e-4)
 # A gain of the forces that no calibration rules out, and the share of it below which a bar of the mass says too much.
 GAIN, TIGHT = 0.01, 0.5
+# A weight that a controller takes away is worth a word where the log would not show this share of the mass that is
+# answered; beyond so many times that mass it shows none.
+UNSEEN, MOST_SET = 0.1, 5.0
 # Units that are named after the fit, and so were not put right before it.
 OF_UNITS = {"force-unit", "length-in-mm"}
 
@@ -128,6 +134,24 @@ def uncalibrated(estimate: Estimate) -> tuple[str, ...]:
     return (
         f"error bars hold no gain of the sensor: forces {100 * GAIN:.0f} % too large would move the mass by "
         f"{moved:.2g} kg, and no log shows it; weigh a known mass once",
+    )
+
+
+def of_a_controller(estimate: Estimate, rows: FitRows, recording: Recording) -> tuple[str, ...]:
+    """Return a note on a payload that is set in a controller, as forces in the axes of the base are mostly from one.
+
+    Motion shows what weight is taken away: nothing is said where it would show much less than is answered.
+    """
+    stream = recording.stream_of("force")
+    if stream is None or not stream.in_world("force") or "weight-compensated" in estimate.codes():
+        return ()
+    least = np.inf if rows.unmeasured else least_shown(rows.log)
+    if least < UNSEEN * estimate.mass:
+        return ()
+    when = "whatever its mass" if least > MOST_SET * estimate.mass else f"below some {float(f'{least:.1g}'):g} kg"
+    return (
+        "forces in the axes of the base are mostly a controller's, which takes away the weight of the payload that is "
+        f"set in it: {when} this log would not show it, and the answer would be what is left; set none before the run",
     )
 
 

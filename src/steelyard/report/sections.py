@@ -268,7 +268,7 @@ def evidence(report: Report) -> Html:
         rows.append(("left out", said, "error at poses that the fit never saw"))
     if report.estimate.bias_covariance.any():
         torque, force = bias(report.estimate)
-        rows.append(("sensor bias", f"{force} N, {torque} N m", "subtract from the raw channels"))
+        rows.append(("sensor bias", f"{force} N, {torque} N m", "subtract from the wrench as logged, in S"))
     delays = [(name, d) for name, d in report.estimate.delays_s.items() if d]
     rows += [("delay", f"{fixed(1e3 * delay, 2)} ms", name) for name, delay in delays[:_MOST]]
     items = [tag("div", tag("dt", n), tag("dd", v, tag("small", why) if why else "")) for n, v, why in rows]

@@ -126,7 +126,7 @@ def _evidence_lines(estimate: Weighed) -> list[str]:
         )
     if estimate.bias_covariance.any():
         torque, force = map(plain, bias(estimate))
-        lines.append(f"  bias       force {force} N, torque {torque} N m (subtract from the raw channels)")
+        lines.append(f"  bias       force {force} N, torque {torque} N m (subtract from the wrench as logged, in S)")
     lines += [f"  delay      {1e3 * delay:+.2f} ms  {name}" for name, delay in estimate.delays_s.items() if delay]
     lines += [f"  note       {note}" for note in estimate.notes]
     return lines

@@ -25,6 +25,7 @@ _QUATERNIONS = {"q", "quat", "quats", "quaternion", "quaternions", "orientation"
 _OTHERS = {"d", "c", "cam", "camera", "object", "obj", "marker", "tag"}  # what is commanded (Franka), or no sensor
 _JOINTS = {"q", "joint", "joints", "qpos", "angles", "jointpositions"}
 _JOINT_STEMS = ("q", "j", "joint", "joint_", "a")
+_TORQUE_OF_JOINT = re.compile(r"(.*(?:tau|torques?|trq|efforts?).*?)_?(\d)")
 _POSES = {"pose", "poses", "tcp", "ee", "eef", "position", "transform"}
 # Words of what is neither a pose nor an angle, although tool or joints have it: `actual_TCP_force`, `tcp_speed`.
 _NO_PLACE = {
@@ -100,6 +101,15 @@ def joints(names: Names) -> tuple[int, ...]:
     found = ([names.plain.get(f"{stem}{start + k}") for k in range(7)] for stem in _JOINT_STEMS for start in (0, 1))
     whole = (tuple(n for n in seven if n is not None) for seven in found if None not in seven[:6])
     return next(whole, ())
+
+
+def joint_torques(plain: Mapping[str, int]) -> tuple[int, ...]:
+    """Return six or seven columns that are torques of an arm's joints by name, counted from 0 or 1; else nothing."""
+    runs: dict[str, list[int]] = {}
+    for name, number in plain.items():
+        if found := _TORQUE_OF_JOINT.fullmatch(name):
+            runs.setdefault(found[1], []).append(number)
+    return next((tuple(run) for run in runs.values() if len(run) in (6, 7)), ())
 
 
 def open_pose(names: Names) -> tuple[int, ...]:

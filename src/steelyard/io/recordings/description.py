@@ -19,7 +19,7 @@ from steelyard.io.entries import Entry, each, gathered
 from steelyard.io.example import EXAMPLE
 from steelyard.io.streams.entries import STREAM, StreamSpec, parse_pose, parse_stream
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, STANDARD_GRAVITY
-from steelyard.spatial import Pose
+from steelyard.spatial import Pose, Rotation
 
 # [m/s^2] gravity on anything with robots; and noise of no sensor, in SI.
 _WEAKEST, _STRONGEST = 0.1, 100.0
@@ -224,3 +224,13 @@ def read_object_pose(text: str) -> ObjectPose:
             f"pose in sensor: {text} has no [object] pose_in_sensor. Write pose_in_sensor = {_EXAMPLE}"
         )
     return found
+
+
+def read_pose(text: str, where: str) -> Pose:
+    """Return the pose that an inline table gives; what it leaves out is none. Raises BadDescription."""
+    try:
+        table = Entry(parse_toml(f"pose = {text.strip()}", where), where).table("pose")
+        rotation, position = parse_pose(table)
+    except BadInput as error:
+        raise BadDescription(f"{error} Give a table in quotes, such as {_EXAMPLE}") from None
+    return Pose(rotation or Rotation.identity(), np.zeros(3) if position is None else position)

@@ -10,7 +10,7 @@ from steelyard.check import Array
 from steelyard.errors import NoDescription
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
-from steelyard.io.recordings.counted import joints, open_pose, open_quaternion, values
+from steelyard.io.recordings.counted import joint_torques, joints, open_pose, open_quaternion, values
 from steelyard.io.streams.usual_names import ANGLES, Names
 from steelyard.io.tables.files import Table
 from steelyard.io.units import ANGLE, SLOWEST, UNITS, angle_unit, length_unit, stamp_unit
@@ -28,11 +28,14 @@ def require_told(table: Table, names: Names, found: Sequence[str]) -> None:
     missing = [name for name in ("force", "torque") if name not in found]
     if missing:
         lines = own_lines(table, names)
-        reason = f"no {' and no '.join(missing)} was recognised"
+        reason = f"no {' and no '.join(missing)} was recognised{_of_joints(table, names)}"
         if all(len(names.vectors(name)) > 1 for name in missing):
             reason = f"several columns may be the {' and the '.join(missing)}"
         elif set(missing) <= set(lines):
-            reason = f"{' and '.join(missing)} are a controller's, whose axes, units and settings only you can confirm"
+            are = "are" if missing[1:] else "is"
+            reason = (
+                f"{' and '.join(missing)} {are} a controller's, whose axes, units and settings only you can confirm"
+            )
         raise _to_check(table, reason, lines)
     if not ATTITUDES & set(found):
         lines = own_lines(table, names)
@@ -47,6 +50,18 @@ def require_told(table: Table, names: Names, found: Sequence[str]) -> None:
                 "rotation-vector) and unit (deg or rad)"
             )
         raise _to_check(table, reason, lines)
+
+
+def _of_joints(table: Table, names: Names) -> str:
+    """Return that torques of joints are no wrench, where there are any."""
+    found = joint_torques(names.plain)
+    if not found:
+        return ""
+    shown = table.header.names or ()
+    return (
+        f', and torques of joints ("{shown[found[0]]}" .. "{shown[found[-1]]}") are not read: log the wrench of a '
+        "sensor, or the one that the controller estimates from them"
+    )
 
 
 def left_out(table: Table, names: Names) -> tuple[str, ...]:

@@ -138,6 +138,12 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
     return ()
 
 
+def least_shown(log: MotionLog) -> float:
+    """Return from which mass [kg] on the log shows a weight that is taken away; infinite where nothing moves enough."""
+    found = two_masses(log)
+    return np.inf if found is None else TAKEN * float(found.less_std[0])
+
+
 def _taken_away(found: TwoMasses | None, least: float) -> bool:
     """Tell whether less is weighed than is accelerated beyond doubt, and by more than this share of the mass."""
     if found is None:

@@ -38,6 +38,8 @@ HEAVIEST = 100.0
 TOO_LARGE, CLOSELY = 2.0, 0.05
 # Nobody is wrong by a larger factor about a rate; masses that are this much unlike are worth a word about one.
 WRONG_RATE, CLOCK = 12.0, 1.2
+# Of a force in the axes of the base that keeps less than this share of the weight all may have been zeroed away.
+WEIGHTLESS = 0.05
 # Both masses together explain all but this share of the force variance, and of what one leaves of means over a second
 # so many times what they leave (`lasting`): a controller did 5 and more, hysteresis 0.6 at most.
 EXPLAINED, CLEAR = 0.5, 1.0
@@ -201,4 +203,6 @@ def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) ->
     if not apart_clearly(view, gravity, rotation):
         return ()
     other = stamp_words(abs(moved), weighed) if weighed > SURE * spread[1] and left < CLOSELY else ""
+    if "force" in view.world and abs(weighed) < WEIGHTLESS * abs(moved):
+        other = "A wrench that was zeroed in the axes of the base with the load in hand does so"
     return (compensated(both, other),)
