@@ -105,7 +105,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         fit = again(groups)
         if known and (taken or not read):  # forces that are misread, and left so, tell no places
             moved_groups, moved_fit, places = with_moments_at_grasps(groups, fit, again, D, C, six_axis)
-            if places is not None and not rather_a_gain(groups, fit) and not pulled(moved_fit):
+            if places is not None and not rather_a_gain(groups, fit) and not beside_pulls(moved_fit)[1]:
                 groups, fit = moved_groups, moved_fit
                 moved = places.taken(log.names)
                 taken = {**taken, **{name: M @ taken.get(name, np.eye(6)) for name, M in moved.items()}}
@@ -124,9 +124,11 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         one = own_gain(groups, fit, again, D)
         return one is not None and with_moments_at_grasps(one.groups, one.fit, again, D, C, six_axis)[2] is None
 
-    def pulled(fit: PayloadFit) -> bool:
-        """Return whether something pulls that stands still in the room: moments that it makes pass for misplaced."""
-        return with_home_bias(fit, D, C, placed.position, six_axis, with_gain)[1] > 0
+    def beside_pulls(fit: PayloadFit) -> tuple[PayloadFit, float]:
+        """Return the fit beside what stands still in the room, and how large that is [N]; as it is where grasps may be
+        elsewhere, since that explains forces as well.
+        """
+        return (fit, 0.0) if spread.blind.size else with_home_bias(fit, D, C, placed.position, six_axis, with_gain)
 
     C = unit_bias(D, six_axis, size)
     standing, propped = unpropped(seen.rows, fitted, D, highest_hz)
@@ -137,7 +139,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     groups, read, payload = first.groups, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     plain = payload
-    payload, home_bias = with_home_bias(payload, D, C, placed.position, six_axis, with_gain)
+    payload, home_bias = beside_pulls(payload)
     _require_one_clock(payload.chi2)
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
         _require_mass(payload)
