@@ -182,9 +182,9 @@ def _require_table(scene: Scene, patches: Array, region: Region) -> None:
     asked = scene.stated is None and scene.enough == LEAST_VIEWS
     if asked and bare_share(scene, patches[level, :3], region) < _TABLE:
         raise CannotAnswer(
-            "no table was found: the plane that most measured points lie on does not go on around the object. It may be a "
-            "face of it, or a floor, or end where the object hangs over its edge. Lay all of the object on the table, move "
-            "the camera so that more of the table is seen, or give table.json."
+            "no table was found: the plane that most measured points lie on does not go on around the object. It may "
+            "be a face of it, or a floor, or end where the object hangs over its edge. Lay all of the object on the "
+            "table, move the camera so that more of the table is seen, or give table.json."
         )
 
 

@@ -90,13 +90,12 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     half, near = int(reach / pitch), int(REACHES[0] * scene.distance / pitch)
     grid = Grid.about_origin(half, pitch)
     cap = max(6 * scene.sigma, _CAP * scene.distance)
-    floor = 0.0 if scene.raised else -cap
-    sums = images.height_map(scene.images, stride, grid.low, pitch, floor, cap, *grid.shape)
+    sums = images.height_map(scene.images, stride, grid.low, pitch, -cap, cap, *grid.shape)
     middle = (slice(half - near, half + near),) * 2
     well, watched, held = _watched(scene, grid, sums[..., 0], middle)
     mean = sums[..., 1] / np.maximum(sums[..., 0], 1)
-    # Beside a stand what lies lower counts as no height at all, and says nothing of how even the stand is.
-    even = mean[well & (mean > 0) & (mean < 3 * scene.sigma)] if scene.raised else mean[well]
+    # What lies lower beside a stand says nothing of how even it is.
+    even = mean[well & (np.abs(mean) < 3 * scene.sigma)] if scene.raised else mean[well]
     spread = middle_half_std(even) if len(even) else 0.0
     level = float(np.median(even)) if len(even) else 0.0
     up = watched & (mean > level + min(max(5 * spread, 0.3 * scene.sigma), 0.5 * cap))

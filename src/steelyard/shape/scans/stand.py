@@ -39,7 +39,7 @@ _PIXELS = 200_000  # that tell colours
 _OTHER, _MOST = 60.0, 0.8  # levels between colours that differ, and the share of the pixels that must
 # Share of the images that hold the brim of a stand that is looked past, at most, and the object on it, at least.
 _CUT, _WHOLE = 0.6, 0.85
-_LOWER = 0.01  # share of the pixels: so many below a plane are of a lower table, or of the sides of this one
+_LOWER = 0.05  # share of the pixels: so many below a plane are those of a lower table
 _UNSURE = 0.6  # of the volume of what may be a stand: standard deviation
 
 
