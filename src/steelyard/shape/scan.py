@@ -23,6 +23,7 @@ from steelyard.shape.scans.patches import surface_of, surfels
 from steelyard.shape.scans.placement import Placement, moved_m, placement
 from steelyard.shape.scans.region import Region, bare_share, followed, lost_share
 from steelyard.shape.scans.registration import Seen, agreed, left_open
+from steelyard.shape.scans.round_below import round_below
 from steelyard.shape.scans.scan_colours import colours_of
 from steelyard.shape.scans.scan_findings import TABLE_OFF, Level, Surface, few_seen, findings_of
 from steelyard.shape.scans.scene import LEAST_VIEWS, Scene, scene_of
@@ -202,7 +203,8 @@ class _Clock:
 def _closed(scene: Scene, xyz: Array, normal: Array, points: int) -> tuple[Array, Array, int, float, Underside]:
     """Return about `points` points, normals, how many of them were seen (first), their distance and the underside."""
     area = len(spread(xyz, normal, np.arange(len(xyz)), 3 * scene.pixel)) * (3 * scene.pixel) ** 2
-    bottom = closed_below(scene, xyz, normal, max(1.5 * scene.pixel, float(np.sqrt(area / _CELLS))))
+    pitch = max(1.5 * scene.pixel, float(np.sqrt(area / _CELLS)))
+    bottom = round_below(closed_below(scene, xyz, normal, pitch), xyz, scene.sigma)
     below, down = bottom.points()
     xyz, normal, seen = np.concatenate([xyz, below]), np.concatenate([normal, down]), len(xyz)
     rows, radius = spread_to(xyz, normal, np.arange(len(xyz)), points, scene.pixel)
