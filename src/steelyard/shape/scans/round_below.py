@@ -19,6 +19,7 @@ from steelyard.shape.scans.underside import Underside, median_along, rim_of
 
 _TOUCHES, _RESTS = 0.5, 0.1  # times the depth noise, share of the underside that is so low where something rests
 _NEAR = 6.0  # times the depth noise: a side that was last seen nearer to the table hides how it goes on
+_LEAST = 0.05  # of the volume: less may be dents in what is flat, rods lose more
 _BLUR = 1.0  # cells over which what falls is averaged
 
 
@@ -42,5 +43,7 @@ def round_below(bottom: Underside, xyz: Array, sigma: float) -> Underside:
     fall = np.where(near, np.clip(height - np.maximum(both - top, bottom.empty), 0.0, height), 0.0)
     weight = ndimage.gaussian_filter(under.astype(float), _BLUR)
     fall = np.where(near, ndimage.gaussian_filter(fall, _BLUR) / np.maximum(weight, 1e-9), 0.0)
+    if fall.sum() < _LEAST * (bottom.top - height)[under].sum():
+        return bottom
     height = np.maximum(height - fall, 0.0)
     return replace(bottom, height=np.where(under, height, np.inf), filled=float(fall.sum()) * bottom.grid.pitch**2)
