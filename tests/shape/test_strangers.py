@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
+from steelyard.shape.carving import carved
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.scan import fuse
+from steelyard.shape.scans.depth_images import Images, height_map
 from steelyard.shape.scans.grid import Grid
 from steelyard.shape.scans.region import Region, bare_share
-from steelyard.shape.scans.table_plane import table_over_floor
-from steelyard.shape.views import Intrinsics, Views
+from steelyard.shape.scans.scene import scene_of
+from steelyard.shape.scans.table_plane import leveller, table_over_floor
+from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.shape.volume import enclose
 from steelyard.spatial import Pose, Rotation
 
@@ -92,7 +95,7 @@ def test_a_floor_is_the_table_where_the_cameras_look_at_what_stands_on_it() -> N
         assert (found.offset, step) == pytest.approx((height, under), abs=1e-6)
 
 
-def test_a_table_goes_on_around_what_stands_on_it() -> None:
+def test_a_table_goes_on_around_what_stands_on_it(views: Views) -> None:
     """Of a face that is taken for the table hardly anything lies beside what stands out of it."""
     grid = Grid.about_origin(20, 0.004)
     mask, stands = np.zeros((2, *grid.shape), bool)
@@ -101,8 +104,36 @@ def test_a_table_goes_on_around_what_stands_on_it() -> None:
     region = Region(grid, mask, stands, 0.05, 0, False)
     around = grid.spots(mask & ~stands)
     one_side = around[around[:, 0] > 0.03]
-    assert [bare_share(table, region) for table in (around, one_side[:0])] == [1.0, 0.0]
-    assert 0.1 < bare_share(one_side, region) < 0.45
+    on_it = replace(scene_of(views), noise=1e-3)
+    assert [bare_share(on_it, table, region) for table in (around, one_side[:0])] == [1.0, 0.0]
+    assert 0.1 < bare_share(on_it, one_side, region) < 0.45
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_what_hangs_over_the_edge_of_a_table_by_most_of_it(monkeypatch: pytest.MonkeyPatch, given: bool) -> None:
+    """The table is bare around a third of it alone, and so is a face of an object."""
+    monkeypatch.setitem(globals(), "PLATE", np.array([[0.02, -0.01, 0.0], [0.15, 0.01, 0.015]]))
+    views = seen_from((30, 55), 10, half=0.05, floor=-0.6)
+    scan = fuse(replace(views, table=TablePlane(np.array([0, 0, 1.0]), 0.0)) if given else views)
+    assert scan.findings == ()
+    assert carved(enclose(scan.cloud, one=True), scan.space).mesh.volume == pytest.approx(39e-6, rel=0.05)
+
+
+def test_a_floor_far_below_a_table_that_is_given_does_not_level_the_views() -> None:
+    x = np.random.default_rng(0).uniform(-1, 1, (3000, 3))
+    floor, table = x * np.array([1, 1, 0]), x[:600] * np.array([0.1, 0.1, 0]) + np.array([0, 0, 0.5])
+    cameras, given = np.array([[0.3, 0, 0.9], [-0.3, 0, 0.9]]), TablePlane(np.array([0, 0, 1.0]), 0.5)
+    for distance, height, under in ((0.5, 0.5, 0.5), (1.0, 0.0, np.inf)):
+        found, step = leveller(np.concatenate([floor, table]), cameras, distance, given)
+        assert (found.offset, step) == pytest.approx((height, under), abs=1e-6)
+
+
+def test_the_side_of_a_table_is_no_height_at_its_edge() -> None:
+    """A thin thing that lies across the edge was cut in two there: one pixel in three shows the side below it."""
+    depth, down = np.array([[[1000, 1000, 1200]]], np.uint16), np.diag([1.0, -1.0, -1.0])
+    images = Images(depth, 1e-3, np.array([1e3, 1e3, 1.0, 0.0]), down[None], np.array([[0.0, 0.0, 1.01]]))
+    count, height, highest = height_map(images, 1, np.array([-1.0, -1.0]), 2.0, -0.02, 0.02, 1, 1)[0, 0]
+    assert (count, height / count, highest) == pytest.approx((2, 0.01, 0.01))
 
 
 def test_points_of_one_object_stay_one_where_its_sides_were_not_seen() -> None:

@@ -23,6 +23,7 @@ from steelyard.shape.scans.patches import surface_of, surfels
 from steelyard.shape.scans.placement import Placement, moved_m, placement
 from steelyard.shape.scans.region import Region, bare_share, followed, lost_share
 from steelyard.shape.scans.registration import Seen, agreed, left_open
+from steelyard.shape.scans.round_below import round_below
 from steelyard.shape.scans.scan_colours import colours_of
 from steelyard.shape.scans.scan_findings import TABLE_OFF, Level, Surface, few_seen, findings_of
 from steelyard.shape.scans.scene import LEAST_VIEWS, Scene, scene_of
@@ -180,10 +181,11 @@ def _require_table(scene: Scene, patches: Array, region: Region) -> None:
     """
     level = (patches[:, 5] > _LEVEL) & (np.abs(patches[:, 2]) < _OFF_TABLE * scene.sigma)
     asked = scene.stated is None and scene.enough == LEAST_VIEWS
-    if asked and bare_share(patches[level, :3], region) < _TABLE:
+    if asked and bare_share(scene, patches[level, :3], region) < _TABLE:
         raise CannotAnswer(
-            "no table was found: the plane that most measured points lie on does not go on around the object, and may "
-            "be a face of it. Move the camera so that more of the table is seen, or give table.json."
+            "no table was found: the plane that most measured points lie on does not go on around the object. It may "
+            "be a face of it, or a floor, or end where the object hangs over its edge. Lay all of the object on the "
+            "table, move the camera so that more of the table is seen, or give table.json."
         )
 
 
@@ -201,7 +203,8 @@ class _Clock:
 def _closed(scene: Scene, xyz: Array, normal: Array, points: int) -> tuple[Array, Array, int, float, Underside]:
     """Return about `points` points, normals, how many of them were seen (first), their distance and the underside."""
     area = len(spread(xyz, normal, np.arange(len(xyz)), 3 * scene.pixel)) * (3 * scene.pixel) ** 2
-    bottom = closed_below(scene, xyz, normal, max(1.5 * scene.pixel, float(np.sqrt(area / _CELLS))))
+    pitch = max(1.5 * scene.pixel, float(np.sqrt(area / _CELLS)))
+    bottom = round_below(closed_below(scene, xyz, normal, pitch), xyz, scene.sigma)
     below, down = bottom.points()
     xyz, normal, seen = np.concatenate([xyz, below]), np.concatenate([normal, down]), len(xyz)
     rows, radius = spread_to(xyz, normal, np.arange(len(xyz)), points, scene.pixel)

@@ -71,7 +71,8 @@ def height_map(
 
     low    (2,) corner of the grid [m]
     pitch  [m]
-    floor, cap  heights beyond which all count alike [m]
+    floor  what lies lower is not of the table, as its sides are not [m]
+    cap    heights above it count alike [m]
     """
     depth = images.depth
     out = np.zeros((rows, columns, 3))
@@ -84,10 +85,10 @@ def height_map(
             line_of_points(images, k, first, v, stride, low, pitch, line)
             for m in range(count):
                 i, j, h = line[0, m], line[1, m], line[2, m]
-                if 0 <= i < rows and 0 <= j < columns:
+                if 0 <= i < rows and 0 <= j < columns and h >= floor:
                     cell = out[np.uint32(i), np.uint32(j)]
                     cell[0] += 1
-                    cell[1] += min(max(h, floor), cap)
+                    cell[1] += min(h, cap)
                     cell[2] = max(cell[2], h)
     return out
 

@@ -4,8 +4,8 @@ Under a part that stands off the table the lowest sight lines leave a wedge. A r
 view tells which. But a rod hangs below where it was last seen by no more than it rises above that, and what is sheer
 from there to its top is no rod. What was closed farther down is as likely air: the volume's bar holds all of it.
 
-Nor is it seen how a thin rod goes on below its sides, so near to the table: there its underside is left flat. The bar
-holds what it would have if it were as round below as it is above.
+Nor is it seen how a thin rod goes on below its sides, so near to the table. The bar holds what was filled there because
+the rod is round above, and what was left open and would be filled, too, if it were as round below.
 """
 
 from __future__ import annotations
@@ -47,10 +47,11 @@ def hanging(scene: Scene, bottom: Underside, xyz: Array, normal: Array) -> tuple
     empty = scene.seen_empty(np.column_stack([spots, level[column, k]]))
     size = tall[column] * grid.pitch**2 / _LEVELS
     closed, left = float(size[~empty].sum()), float(tall.sum() * grid.pitch**2 - size[empty].sum())
-    return ((_open(closed / left),) if closed > _MUCH * left else ()), float(np.hypot(closed, _round_below(bottom)))
+    unsure = float(np.hypot(closed, bottom.filled + _left_open(bottom)))
+    return ((_open(closed / left),) if closed > _MUCH * left else ()), unsure
 
 
-def _round_below(bottom: Underside) -> float:
+def _left_open(bottom: Underside) -> float:
     """Return the volume [m^3] that was left open under what rises from its rim, if it falls below as it rises above."""
     under = bottom.under
     nearest = tuple(ndimage.distance_transform_edt(~rim_of(under), return_distances=False, return_indices=True))

@@ -26,6 +26,8 @@ _COARSE = 4  # cells between those for which it is asked which images hold them
 _CAP = 0.02  # of the camera's distance: heights beyond it count alike where the object is sought
 _NEAR = 3  # cells of the map of heights: a point so near shows the surface there
 _BARE = 0.3  # of a gap: more bare table parts two objects
+_RESTS = 0.3  # of the brim around an object: so much goes on around what rests on a table, whatever hangs over its edge
+_BELOW, _SIGHT = 6.0, np.radians(40.0)  # times the depth noise, slope of sight lines: where it is seen under a table
 _MARGIN = 0.008  # of table kept around the object [m]
 
 
@@ -88,13 +90,12 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     half, near = int(reach / pitch), int(REACHES[0] * scene.distance / pitch)
     grid = Grid.about_origin(half, pitch)
     cap = max(6 * scene.sigma, _CAP * scene.distance)
-    floor = 0.0 if scene.raised else -cap
-    sums = images.height_map(scene.images, stride, grid.low, pitch, floor, cap, *grid.shape)
+    sums = images.height_map(scene.images, stride, grid.low, pitch, -cap, cap, *grid.shape)
     middle = (slice(half - near, half + near),) * 2
     well, watched, held = _watched(scene, grid, sums[..., 0], middle)
     mean = sums[..., 1] / np.maximum(sums[..., 0], 1)
-    # Beside a stand what lies lower counts as no height at all, and says nothing of how even the stand is.
-    even = mean[well & (mean > 0) & (mean < 3 * scene.sigma)] if scene.raised else mean[well]
+    # What lies lower beside a stand says nothing of how even it is.
+    even = mean[well & (np.abs(mean) < 3 * scene.sigma)] if scene.raised else mean[well]
     spread = middle_half_std(even) if len(even) else 0.0
     level = float(np.median(even)) if len(even) else 0.0
     up = watched & (mean > level + min(max(5 * spread, 0.3 * scene.sigma), 0.5 * cap))
@@ -186,13 +187,30 @@ def _held(scene: Scene, grid: Grid) -> tuple[Array, Array]:
     return fine[..., 0], fine[..., 1]
 
 
-def bare_share(table: Array, region: Region) -> float:
-    """Return the share of the brim around where the object stands that points (N, 3) of the table cover."""
+def bare_share(scene: Scene, table: Array, region: Region) -> float:
+    """Return the share of the brim around where the object stands that points (N, 3) of the table cover.
+
+    Beside what hangs over the table's edge there is none to cover it: views see past what lies lower there.
+    """
     brim = region.mask & ~ndimage.binary_dilation(ndimage.binary_fill_holes(region.stands), np.ones((3, 3)))
+    if not brim.any():
+        return 1.0
     covered = np.zeros_like(brim)
     covered[region.grid.cells_under(table)[0]] = True
-    covered = ndimage.binary_dilation(covered, np.ones((3, 3)))
-    return float((brim & covered).sum() / brim.sum()) if brim.any() else 1.0
+    covered = brim & ndimage.binary_dilation(covered, np.ones((3, 3)))
+    beside = ndimage.distance_transform_edt(~region.stands, return_distances=False, return_indices=True)
+    due = brim & (covered | ~_over_the_edge(scene, region)[tuple(beside)])
+    return float(covered.sum() / max(due.sum(), _RESTS * brim.sum()))
+
+
+def _over_the_edge(scene: Scene, region: Region) -> Any:
+    """Return under which cells (I, J) of the object views see past what lies lower than the table."""
+    deep = region.grid.pitch * ndimage.distance_transform_edt(region.stands)
+    low = region.grid.spots(region.stands)
+    low[:, 2] = -_BELOW * scene.sigma - np.tan(_SIGHT) * deep[region.stands]
+    over = np.zeros_like(region.stands)
+    over[region.stands] = scene.seen_empty(low)
+    return over
 
 
 def lost_share(xyz: Array, region: Region) -> float:

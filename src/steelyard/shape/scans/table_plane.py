@@ -86,12 +86,13 @@ def table_over_floor(points: Array, cameras: Array, looks: Array, distance: floa
 def leveller(points: Array, cameras: Array, distance: float, stated: TablePlane) -> tuple[TablePlane, float]:
     """Return the plane that tells how views lie, and how far another one is under it [m], inf without.
 
-    A plane that was given may be that of a stand: then it is that one, or the table under it, whichever shows more.
+    A plane that was given may be that of a stand: then it is that one, or the table under it, whichever shows more. A
+    floor is too far off for that, and the wider it shows, the fewer views have much of it near.
     """
     with suppress(CannotAnswer):
         found = find_table(points, cameras, distance)
         step = -float(stated.height(found.offset * found.normal))
-        if found.normal @ stated.normal > _PARALLEL and step > NEAR * distance / 2:
+        if found.normal @ stated.normal > _PARALLEL and NEAR / 2 < step / distance < _LOOKED_AT:
             return found, np.inf
         lower = points[stated.height(points) < -NEAR * distance]
         under = find_table(lower, cameras, distance)

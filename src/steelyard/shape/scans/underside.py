@@ -39,6 +39,7 @@ class Underside:
     seen    (I, J) whether surface points lie on that underside already
     top     (I, J) highest seen surface [m], -inf without
     empty   (I, J) height up to which views saw that nothing is there [m], 0 where there is no object above
+    filled  volume of it that is there only if the object is as round below as it is above [m^3]
     """
 
     grid: Grid
@@ -46,6 +47,7 @@ class Underside:
     seen: Any
     top: Array
     empty: Array
+    filled: float = 0.0
 
     @property
     def under(self) -> Mask:
