@@ -139,7 +139,8 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     groups, read, payload = first.groups, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     plain = payload
-    payload, home_bias = beside_pulls(payload)
+    # What a filter takes of accelerations passes for it.
+    payload, home_bias = beside_pulls(payload) if late is None else (payload, 0.0)
     _require_one_clock(payload.chi2)
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
         _require_mass(payload)

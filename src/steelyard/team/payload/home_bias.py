@@ -10,6 +10,10 @@ with [s_j; q_j] (4,) the directions that the columns [1; p_i] span, and [0; l] b
 weight that is taken away may lie off the grasp. So u is up to twelve numbers (four where only up is known). What points
 up is weight without inertia: still poses cannot tell it from mass, motion can. The u are fitted beside the ten
 parameters; how large b is, and whether there is any, is averaged by evidence.
+
+Accelerations may be off by a share e ~ N(0, t^2), of filters and grasps that give way: phi is then 1 + e times what the
+payload is, beside a force of e times its weight, and u has that much more room along the weight. Without any bias, too:
+what acceleration says of the mass against the weight is believed to t and no more.
 """
 
 from __future__ import annotations
@@ -31,9 +35,11 @@ SIZES = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])
 NONE = 100.0
 # Those that are asked first, and the share from which such a bias counts.
 ASKED = SIZES[1::2]
-COUNTS = 0.01
+COUNTS = 0.05
 # u is told in so many times its size: what is known of it beforehand is then no direction that is lost.
 UNIT = 4.0
+# By what share accelerations may be off.
+OF_ACCELERATION = 0.02
 # [m] how far off a six-axis wrist the weight lies that is taken away.
 OFF = 0.2
 # From this share of none at all on it is not said that there is one.
@@ -45,10 +51,38 @@ SPANNED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
+class _Pulled:
+    """Models beside forces in the room whose variances beforehand are `variance` (U,) [N^2].
+
+    error  how much of the first of u errors of acceleration make, beforehand
+    """
+
+    models: Models
+    variance: Array
+    error: float
+
+    @property
+    def chance(self) -> float:
+        """Logarithm of the evidence."""
+        return self.models.evidence + len(self.variance) * float(np.log(UNIT))
+
+    def told(self) -> tuple[Array, Array]:
+        """Return the ten parameters and their covariance, with errors of acceleration taken out."""
+        mean = self.models.mean()
+        share = self.error**2 / self.variance[0]
+        along = OF_ACCELERATION * share / max(self.error, 1e-300)
+        taken = np.eye(10, len(mean))
+        taken[:, 10] = -along * mean[:10]
+        left = OF_ACCELERATION**2 * (1 - share)
+        covariance = taken @ self.models.covariance_about(mean) @ taken.T + left * np.outer(mean[:10], mean[:10])
+        return taken @ mean, covariance
+
+
+@dataclass(frozen=True, eq=False)
 class _Tried:
     """Models without such a bias and at each of `sizes` (S,) [N], with the share (1 + S,) of each by evidence."""
 
-    models: list[Models]
+    models: list[_Pulled]
     share: Array
     sizes: Array
 
@@ -64,32 +98,40 @@ class _Tried:
 
     def averaged(self, fit: PayloadFit, levers: Array) -> PayloadFit:
         """Return the fit averaged over sizes by their share; what follows from the rows is that of the likeliest."""
-        means = [one.mean() for one in self.models]
-        phi = self.share @ [mean[:10] for mean in means]
+        # Without any, the fit as it is: errors of acceleration are for telling such a bias from weight.
+        told = [(fit.parameters, fit.covariance / fit.unsure), *(one.told() for one in self.models[1:])]
+        phi = self.share @ [mean for mean, _ in told]
         covariance = np.zeros((10, 10))
-        for share, mean, one in zip(self.share, means, self.models, strict=True):
-            off = mean[:10] - phi
-            covariance += share * (one.covariance_about(mean)[:10, :10] + np.outer(off, off))
-        number = int(np.argmax(self.share))
-        likely = self.models[number]
-        beside = likely.recordings(likely.best)
-        places = row_slices([group.parts for group in fit.groups])
-        gain = self.share @ [one.gain**2 for one in self.models]
+        for share, (mean, own) in zip(self.share, told, strict=True):
+            covariance += share * (own + np.outer(mean - phi, mean - phi))
+        models = [one.models for one in self.models]
+        gain = self.share @ [one.gain**2 for one in models]
         anew, lasting = (
-            np.tensordot(self.share, each, 1) for each in zip(*(one.gain_squares for one in self.models), strict=True)
+            np.tensordot(self.share, each, 1) for each in zip(*(one.gain_squares for one in models), strict=True)
         )
-        return replace(
+        fit = replace(
             fit,
             parameters=phi,
             covariance=covariance * fit.unsure,
-            information=likely.information[likely.best],
             gain=float(np.sqrt(gain)),
             gain_squares=(anew, lasting),
-            gainless=float(self.share @ [one.gainless for one in self.models]),
-            biases=beside.biases,
-            blind=tuple(tuple(beside.blind[own]) for own in places),
-            levers=levers if number else fit.levers,
+            gainless=float(self.share @ [one.gainless for one in models]),
         )
+        number = int(np.argmax(self.share))
+        return _beside(fit, models[number], levers) if number else fit
+
+
+def _beside(fit: PayloadFit, likely: Models, levers: Array) -> PayloadFit:
+    """Return the fit with what follows from the rows in these models."""
+    beside = likely.recordings(likely.best)
+    places = row_slices([group.parts for group in fit.groups])
+    return replace(
+        fit,
+        information=likely.information[likely.best],
+        biases=beside.biases,
+        blind=tuple(tuple(beside.blind[own]) for own in places),
+        levers=levers,
+    )
 
 
 def with_home_bias(
@@ -103,24 +145,27 @@ def with_home_bias(
 
     Noise and its weights are kept: such a bias hardly changes within a recording.
     """
-    levers = home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3, OFF * six_axis.any())
-    plain, each = fit.normals, zip(fit.groups, fit.weights, strict=True)
+    off = OFF * six_axis.any()
+    levers, weight = _weight_first(home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3, off), _weight(fit))
+    each, error = zip(fit.groups, fit.weights, strict=True), OF_ACCELERATION * weight
     wide = [one for group, weights in each for one in group.normals(D, weights, levers)]
+    first = np.eye(1, len(levers))[0]
 
-    def of(size: float, ladder: Array) -> Models:
-        scale = np.concatenate([fit.scale, np.full(len(levers), UNIT * size)])
-        return Models.of(_held(wide, size), C, ladder, scale)
+    def of(size: float, ladder: Array) -> _Pulled:
+        variance = size**2 + error**2 * first if size else np.full(1, error**2)
+        scale = np.concatenate([fit.scale, UNIT * np.sqrt(variance)])
+        return _Pulled(Models.of(_held(wide, variance), C, ladder, scale), variance, error)
 
     def tried(ladder: Array, sizes: Array) -> _Tried:
-        none = Models.of(plain, C, ladder, fit.scale)
-        beside = [of(size, ladder) for size in sizes]
-        chance = [one.evidence + len(levers) * np.log(UNIT) for one in beside]
-        return _Tried([none, *beside], shares(np.array([none.evidence + np.log(NONE), *chance])), sizes)
+        models = [of(size, ladder) for size in (0.0, *sizes)]
+        chance = np.array([one.chance for one in models])
+        chance[0] += np.log(NONE)
+        return _Tried(models, shares(chance), sizes)
 
     # Without gains first, at a tenth of the cost: where no such bias shows, none does with them.
-    if not with_gain or tried(ladder_of(len(plain), False), ASKED).counts:
-        ladder = ladder_of(len(plain), with_gain)
-        likely = (Models.of(plain, C, ladder, fit.scale).share > UNLIKELY) | ~ladder[:, 2:].any(1)
+    if not with_gain or tried(ladder_of(len(wide), False), ASKED).counts:
+        ladder = ladder_of(len(wide), with_gain)
+        likely = (of(0.0, ladder).models.share > UNLIKELY) | ~ladder[:, 2:].any(1)
         found = tried(ladder[likely], SIZES)
         if found.counts:
             return found.averaged(fit, levers), found.size
@@ -144,9 +189,33 @@ def home_levers(places: Array, axes: int, off: float = 0.0) -> Array:
     return out.reshape(-1, 6, 3 * axes)
 
 
-def _held(normals: Sequence[Normal], size: float) -> list[Normal]:
-    """Return the equations with u held to zero by `size` [N], once for all recordings."""
-    H = normals[0].H.copy()
-    held = np.arange(10, len(H) - 6)
-    H[held, held] += size**-2.0
-    return [replace(normals[0], H=H), *normals[1:]]
+def _weight(fit: PayloadFit) -> Array:
+    """Return the wrench (6, 3 axes) at B that what stands still in the room makes as the weight of the payload."""
+    parts = [part for group in fit.groups for part in group.parts]
+    rows = sum(float(part.scatter[:, -1, -1].sum()) for part in parts)
+    # Accelerations come to nothing on average: what is left is gravity.
+    pull = -sum(part.room[:, :, 3:6].sum(0) for part in parts) / rows
+    pulls = np.einsum("kii->k", pull.reshape(-1, 3, 3))
+    each = np.concatenate([cross_matrix(fit.parameters[1:4]), fit.parameters[0] * np.eye(3)])
+    return np.concatenate([pull * each for pull in pulls], axis=1)
+
+
+def _weight_first(levers: Array, weight: Array) -> tuple[Array, float]:
+    """Return levers (U, 6, Q) turned so that the first makes what is like the weight (6, Q), and how much does."""
+    flat = levers.reshape(len(levers), -1)
+    along = np.linalg.lstsq(flat.T, weight.ravel())[0]
+    turn = np.linalg.qr(np.column_stack([along, np.eye(len(along))]))[0]
+    turn[:, 0] = along / np.linalg.norm(along)  # whose sign is open
+    return np.asarray((turn.T @ flat).reshape(levers.shape)), float(np.linalg.norm(along))
+
+
+def _held(normals: Sequence[Normal], variance: Array) -> list[Normal]:
+    """Return the equations of the first of u with variances (U,) [N^2] beforehand, once for all recordings."""
+    count = len(variance)
+    kept = np.r_[: 10 + count, len(normals[0].H) - 6 : len(normals[0].H)]
+    out = [
+        replace(n, H=n.H[np.ix_(kept, kept)], g=n.g[kept], noise=n.noise[: 10 + count, : 10 + count]) for n in normals
+    ]
+    held = np.arange(10, 10 + count)
+    out[0].H[held, held] += 1 / variance
+    return out
