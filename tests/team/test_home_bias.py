@@ -50,10 +50,10 @@ def said(found: TeamEstimate) -> bool:
 
 
 @pytest.mark.parametrize("name", ["A", "C"])
-@pytest.mark.parametrize(("size", "least"), [(0.1, 3), (0.5, 4)])
+@pytest.mark.parametrize(("size", "least"), [(0.1, 6), (0.5, 8)])
 def test_it_is_in_the_bars_and_said(name: str, size: float, least: int) -> None:
     errors, told = [], 0
-    for seed in range(4):
+    for seed in range(8):
         trial = simulate_team(case(name), seed)
         found = JointTeam().identify(biased(trial, size, seed))
         told += said(found)
@@ -84,7 +84,7 @@ def pulled(trial: TeamTrial, pull: Array) -> TeamLog:
     return trial.log.with_recordings(*(r.changed(beside, {"robot1": pull}) for r in trial.log.recordings))
 
 
-@pytest.mark.parametrize("pull", [[2.0, -1.0, 5.0], [0.0, 0.0, -25.0]], ids=["cable", "compensation"])
+@pytest.mark.parametrize("pull", [[6.0, -4.0, 8.0], [0.0, 0.0, -25.0]], ids=["cable", "compensation"])
 @pytest.mark.parametrize("six_axis", [True, False])
 def test_what_pulls_one_robot_is_named_and_taken_out(pull: list[float], six_axis: bool) -> None:
     who = frozenset(range(4)) if six_axis else frozenset()
@@ -94,7 +94,7 @@ def test_what_pulls_one_robot_is_named_and_taken_out(pull: list[float], six_axis
         found = JointTeam().identify(pulled(trial, np.array(pull)))
         assert found.codes() & {"cable-force", "motion-mismatch"} == {"cable-force"}
         assert np.abs(off(found, trial)).max() < 2.5
-        assert found.std[0] < 0.3
+        assert found.std[0] < 0.5
     assert not said(JointTeam().identify(trial.log))
 
 
