@@ -26,8 +26,8 @@ GAINLESS = 0.1
 USUAL_GAIN = 0.01
 # A direction is called by an axis where it is within this cosine of it.
 ALONG = 0.9
-# A bias that stands still in the room is worth a word from this size [N].
-HOME_BIAS = 0.03
+# Forces that stand still in the room are worth a word from this size [N].
+ROOM_FORCE = 0.03
 # From this share of the weight on it is more than the error of a sensor.
 PULLS = 0.01
 # Steps [standard deviations] that a fit may leave untaken without a word.
@@ -176,7 +176,7 @@ def pulled_in_room(size: float, weight: float) -> tuple[tuple[Finding, ...], tup
 
     weight  of the payload [N]
     """
-    if size < HOME_BIAS:
+    if size < ROOM_FORCE:
         return (), ()
     what = f"Forces of about {size:.1g} N stand still in the axes of the robots' homes: they look like weight"
     if size < PULLS * weight:

@@ -27,9 +27,9 @@ from steelyard.team.motion_fit import MotionFit, against
 from steelyard.team.payload.body_rows import PayloadRows, balance_frame, require_balance, require_runs, summing
 from steelyard.team.payload.doubt import weight_by_gains
 from steelyard.team.payload.fit import PayloadFit, Weighing, fit_payload
-from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.late_forces import with_timely_forces
 from steelyard.team.payload.model import Group, unit_bias, units_of_body, weight
+from steelyard.team.payload.room_forces import with_room_forces
 from steelyard.team.payload.spectra import band_edges, gathered, motion_noise
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.yielding import Yields
@@ -128,7 +128,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         """Return the fit beside what stands still in the room, and how large that is [N]; as it is where grasps may be
         elsewhere, since that explains forces as well.
         """
-        return (fit, 0.0) if spread.blind.size else with_home_bias(fit, D, C, placed.position, six_axis, with_gain)
+        return (fit, 0.0) if spread.blind.size else with_room_forces(fit, D, C, placed.position, six_axis, with_gain)
 
     C = unit_bias(D, six_axis, size)
     standing, propped = unpropped(seen.rows, fitted, D, highest_hz)
@@ -140,7 +140,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     plain = payload
     # What a filter takes of accelerations passes for it.
-    payload, home_bias = beside_pulls(payload) if late is None else (payload, 0.0)
+    payload, pull = beside_pulls(payload) if late is None else (payload, 0.0)
     _require_one_clock(payload.chi2)
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
         _require_mass(payload)
@@ -166,7 +166,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         assembled(log, grasps, spread, payload, D, against(motion.late, log.reference)), wrists, size
     )
     team = clocked(team, seen.begun.first(log))
-    pulls, little = pulled_in_room(home_bias, weight(payload.parameters))
+    pulls, little = pulled_in_room(pull, weight(payload.parameters))
     # Who errs, when, and what was read wrongly comes before what is seen of grasps, and that before what does not fit.
     found = (
         *bad_robots(log.names, motion.fit.noise),

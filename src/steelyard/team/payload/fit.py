@@ -51,7 +51,7 @@ class PayloadFit:
     normals      equations of every recording with these weights
     weights      (K, 6, 6) per group     groups  with their noise     blind  (10, 6) per recording: H_pb H_bb^-1
     unsure       factor by which weights that come from the rows widen the covariance
-    levers       (U, 6, Q) of biases that keep their direction in the room (`home_bias`); none in this module. Where
+    levers       (U, 6, Q) of biases that keep their direction in the room (`room_forces`); none in this module. Where
                  there are, information and blind are those of [phi, u]
     """
 

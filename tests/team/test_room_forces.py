@@ -14,7 +14,7 @@ from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import TeamNoise, TeamScene, case
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
-from steelyard.team.payload.home_bias import home_levers
+from steelyard.team.payload.room_forces import room_levers
 
 NOTE = "in the axes of the robots' homes"
 TWISTS = TeamNoise(force_white_N=0.3, rate_rad_s=1e-3, velocity_m_s=5e-4)
@@ -67,7 +67,7 @@ def test_without_it_the_answer_is_as_before(monkeypatch: pytest.MonkeyPatch) -> 
     trial = simulate_team(case("A"), 1)
     found = JointTeam().identify(trial.log)
     assert not said(found)
-    monkeypatch.setattr("steelyard.team.weighed.with_home_bias", lambda fit, *_: (fit, 0.0))
+    monkeypatch.setattr("steelyard.team.weighed.with_room_forces", lambda fit, *_: (fit, 0.0))
     assert np.array_equal(JointTeam().identify(trial.log).covariance, found.covariance)
 
 
@@ -112,7 +112,7 @@ def test_levers_make_the_wrench_of_biases_at_the_grasps() -> None:
     rng = np.random.default_rng(0)
     for count, spanned in ((2, 2), (3, 3), (6, 4)):
         places, bias = rng.normal(size=(2, count, 3))
-        levers = home_levers(places, 3)
+        levers = room_levers(places, 3)
         assert levers.shape == (3 * spanned, 6, 9)
         # Room and B have the same axes: c_k = e_k.
         columns = levers @ np.eye(3).reshape(9)

@@ -70,7 +70,7 @@ class _Pulled:
         """Return the ten parameters and their covariance, with errors of acceleration taken out."""
         mean = self.models.mean()
         share = self.error**2 / self.variance[0]
-        along = OF_ACCELERATION * share / max(self.error, 1e-300)
+        along = OF_ACCELERATION * share / self.error
         taken = np.eye(10, len(mean))
         taken[:, 10] = -along * mean[:10]
         left = OF_ACCELERATION**2 * (1 - share)
@@ -134,7 +134,7 @@ def _beside(fit: PayloadFit, likely: Models, levers: Array) -> PayloadFit:
     )
 
 
-def with_home_bias(
+def with_room_forces(
     fit: PayloadFit, D: Array, C: Array, places: Array, six_axis: Mask, with_gain: bool = True
 ) -> tuple[PayloadFit, float]:
     """Return the fit with biases that keep their direction in the room allowed for, and how large they are [N].
@@ -146,7 +146,7 @@ def with_home_bias(
     Noise and its weights are kept: such a bias hardly changes within a recording.
     """
     off = OFF * six_axis.any()
-    levers, weight = _weight_first(home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3, off), _weight(fit))
+    levers, weight = _weight_first(room_levers(places, fit.groups[0].parts[0].room.shape[1] // 3, off), _weight(fit))
     each, error = zip(fit.groups, fit.weights, strict=True), OF_ACCELERATION * weight
     wide = [one for group, weights in each for one in group.normals(D, weights, levers)]
     first = np.eye(1, len(levers))[0]
@@ -172,7 +172,7 @@ def with_home_bias(
     return fit, 0.0
 
 
-def home_levers(places: Array, axes: int, off: float = 0.0) -> Array:
+def room_levers(places: Array, axes: int, off: float = 0.0) -> Array:
     """Return the wrench E (U, 6, 3 axes) at B that each unit of u makes of what stands still in the room.
 
     places  (N, 3) [m] of the grasps in B     axes  how many of the room's axes are known: 3, or 1 where only up is
@@ -203,10 +203,11 @@ def _weight(fit: PayloadFit) -> Array:
 def _weight_first(levers: Array, weight: Array) -> tuple[Array, float]:
     """Return levers (U, 6, Q) turned so that the first makes what is like the weight (6, Q), and how much does."""
     flat = levers.reshape(len(levers), -1)
-    along = np.linalg.lstsq(flat.T, weight.ravel())[0]
+    along = np.linalg.lstsq(flat.T, weight.ravel(), rcond=None)[0]
     turn = np.linalg.qr(np.column_stack([along, np.eye(len(along))]))[0]
-    turn[:, 0] = along / np.linalg.norm(along)  # whose sign is open
-    return np.asarray((turn.T @ flat).reshape(levers.shape)), float(np.linalg.norm(along))
+    size = max(float(np.linalg.norm(along)), 1e-9)
+    turn[:, 0] = along / size  # whose sign is open
+    return np.asarray((turn.T @ flat).reshape(levers.shape)), size
 
 
 def _held(normals: Sequence[Normal], variance: Array) -> list[Normal]:
