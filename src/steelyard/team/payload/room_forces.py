@@ -33,9 +33,9 @@ from steelyard.team.stacked import row_slices
 # [N] the sizes that are tried; none at all is beforehand so many times as likely as any of them.
 SIZES = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])
 NONE = 100.0
-# Those that are asked first, and the share from which such a bias counts.
+# Those that are asked first, the share from which the others are, and that from which such a force counts.
 ASKED = SIZES[1::2]
-COUNTS = 0.05
+LIKELY, COUNTS = 0.05, 0.2
 # u is told in so many times its size: what is known of it beforehand is then no direction that is lost.
 UNIT = 4.0
 # By what share accelerations may be off.
@@ -87,9 +87,9 @@ class _Tried:
     sizes: Array
 
     @property
-    def counts(self) -> bool:
-        """Whether such a bias is likely enough to count."""
-        return bool(self.share[1:].sum() > COUNTS)
+    def some(self) -> float:
+        """How likely there is such a force."""
+        return float(self.share[1:].sum())
 
     @property
     def size(self) -> float:
@@ -163,11 +163,11 @@ def with_room_forces(
         return _Tried(models, shares(chance), sizes)
 
     # Without gains first, at a tenth of the cost: where no such bias shows, none does with them.
-    if not with_gain or tried(ladder_of(len(wide), False), ASKED).counts:
+    if not with_gain or tried(ladder_of(len(wide), False), ASKED).some > LIKELY:
         ladder = ladder_of(len(wide), with_gain)
         likely = (of(0.0, ladder).models.share > UNLIKELY) | ~ladder[:, 2:].any(1)
         found = tried(ladder[likely], SIZES)
-        if found.counts:
+        if found.some > COUNTS:
             return found.averaged(fit, levers), found.size
     return fit, 0.0
 
