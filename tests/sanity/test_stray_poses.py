@@ -54,3 +54,15 @@ def test_poses_that_stay_or_are_many_are_kept() -> None:
     for first, rows in (([200], 6), (list(range(10, 900, 12)), 2)):
         (stream,) = turned_away(log, first, rows).streams
         assert without_strays(stream) == (stream, ())
+
+
+def test_poses_that_were_reached_one_by_one_are_kept() -> None:
+    """A single far attitude among near ones, recorded a second after the one before, is no stray."""
+    (stream,) = recorded("slow", 0).streams
+    tilts = 0.02 * np.random.default_rng(1).normal(size=(len(stream), 3))
+    tilts[300] = [0.0, 0.8, 0.0]
+    turned = {**stream.channels, "rotation": Rotation.exp(tilts).matrix}
+    quick = replace(stream, channels=turned)
+    assert without_strays(quick)[1] != ()
+    slow = replace(quick, time=np.arange(len(stream), dtype=float))
+    assert without_strays(slow) == (slow, ())

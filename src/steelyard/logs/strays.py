@@ -18,8 +18,8 @@ STEPS, USUAL, RANGE, QUANTA = 4.0, 0.75, 0.02, 4.0
 # Of each step the middle one of so many around it is how things move.
 AROUND = 9
 # So many rows at most, and so long [s], are away, by more than a leap and so many times what lies between the rows
-# beside. A single row may last longer: nothing moves so fast.
-LONGEST, SECONDS, BACK = 4, 0.06, 5.0
+# beside. A single row may last longer, but for SLOWEST: an arm goes away and back in that time.
+LONGEST, SECONDS, BACK, SLOWEST = 4, 0.06, 5.0, 0.25
 # Where more than this share of the rows leap they are read wrongly, or were recorded one by one.
 MOST = 0.1
 # Rows that tell usual steps.
@@ -31,11 +31,12 @@ def strays(values: Array, step: float, least: float = 0.0) -> Mask:
 
     least  by how much they are away at the least, in the unit of the numbers
 
-    Of the first and last rows those are that one leap parts from all others. None where rows leap often, or are few.
+    Of the first and last rows those are that one leap parts from all others. None are where rows leap often, are few, or
+    are far apart.
     """
     rows = len(values)
     away = np.zeros(rows, np.bool_)
-    if rows < FEWEST or not _stand_out(values):
+    if rows < FEWEST or step > SLOWEST or not _stand_out(values):
         return away
     path = _leaps(values, least)
     leaps = np.linalg.norm(np.diff(path, axis=0), axis=1)
