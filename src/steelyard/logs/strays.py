@@ -31,8 +31,8 @@ def strays(values: Array, step: float, least: float = 0.0) -> Mask:
 
     least  by how much they are away at the least, in the unit of the numbers
 
-    Of the first and last rows those are that one leap parts from all others. None are where rows leap often, are few, or
-    are far apart.
+    Of the first and last rows those are that one leap parts from all others. None are where rows leap often, or are few
+    or far apart.
     """
     rows = len(values)
     away = np.zeros(rows, np.bool_)
