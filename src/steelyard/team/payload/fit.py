@@ -48,7 +48,6 @@ class PayloadFit:
     gain_squares mean products of the gains' errors: drawn anew (R, 3 N, 3 N), and lasting (3 N, 3 N)
     gainless     share of the evidence that gains do not err at all
     biases       (R, 6) that every recording is taken to have
-    normals      equations of every recording with these weights
     weights      (K, 6, 6) per group     groups  with their noise     blind  (10, 6) per recording: H_pb H_bb^-1
     unsure       factor by which weights that come from the rows widen the covariance
     levers       (U, 6, Q) of biases that keep their direction in the room (`room_forces`); none in this module. Where
@@ -66,7 +65,6 @@ class PayloadFit:
     gainless: float
     groups: tuple[Group, ...]
     biases: Array
-    normals: tuple[Normal, ...]
     weights: tuple[Array, ...]
     blind: tuple[tuple[Array, ...], ...]
     residual: Array
@@ -111,7 +109,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     return PayloadFit(
         phi, models.covariance_about(phi) * unsure, shown.lost, scale, models.information[models.best],
         shown.condition, models.gain, models.gain_squares, models.gainless, groups,
-        models.recordings(models.best).biases, found.normals, found.weights, found.blind, _residual(groups),
+        models.recordings(models.best).biases, found.weights, found.blind, _residual(groups),
         float(models.chi2[models.best]) / max(6 * _rows(groups) - 10, 1.0), unsure,
     )  # fmt: skip
 
@@ -211,13 +209,10 @@ class Equations(Protocol[G]):
 class Round(Generic[G]):
     """The models of one round, with what they were made from, and the groups renewed by them.
 
-    normals  of all recordings, from the noise and the weights of groups
-
     phi  (P,)     blind  (P, B) per group and recording, as of `Recordings`
     """
 
     phi: Array
-    normals: tuple[Normal, ...]
     models: Models
     blind: tuple[tuple[Array, ...], ...]
     groups: tuple[G, ...]
@@ -231,15 +226,14 @@ class Round(Generic[G]):
         """Return the round from phi (P,) and the noise of groups; C, ladder and scale as of `Models`."""
         weights = tuple(equations.weights(group, phi) for group in groups)
         normals = [equations.normals(group, W) for group, W in zip(groups, weights, strict=True)]
-        every = tuple(one for each in normals for one in each)
-        models = Models.of(every, C, ladder, scale)
+        models = Models.of([one for each in normals for one in each], C, ladder, scale)
         beside = models.recordings(models.best)
         places = row_slices(normals)
         renewed = tuple(
             equations.judged(group, W, beside, own.start) for group, W, own in zip(groups, weights, places, strict=True)
         )
         blind = tuple(tuple(beside.blind[own]) for own in places)
-        return cls(models.mean(), every, models, blind, groups, weights, renewed)
+        return cls(models.mean(), models, blind, groups, weights, renewed)
 
     @property
     def change(self) -> float:
